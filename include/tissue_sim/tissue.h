@@ -115,14 +115,15 @@ class Tissue {
   /// that was read last.
   virtual void read_surface(SurfaceTriangles& surface) = 0;
   /// Gives the tissue impulses at the corners of the triangles that read_surface() gave last, since
-  /// when it must not have advanced: nine numbers a triangle [N s]. They go to what moves a corner.
+  /// when it must not have advanced: three numbers a triangle, which each corner gets [N s]. They go
+  /// to what moves a corner.
   virtual void push_surface(Span<const float> /*impulses*/) {
     throw std::logic_error("nothing presses on the surface of this tissue from without");
   }
   /// The triangles of `read`, which read_surface() gave last, where they are now; until the tissue
   /// advances. None where it is not on a GPU, or has others by now.
   virtual GpuSurface surface_on_gpu(const SurfaceTriangles& /*read*/) { return {}; }
-  /// As push_surface(), of impulses there: three numbers a triangle, which each corner gets.
+  /// As push_surface(), of impulses there; they stay until the tissue has advanced.
   virtual void push_surface_on_gpu(const float* /*impulses*/) {
     throw std::logic_error("the surface of this tissue is not on a GPU");
   }

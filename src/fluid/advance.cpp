@@ -155,8 +155,8 @@ void collect_touches(const FluidState& s, const FluidView& view, FluidWalls& wal
     const FluidTouch& touch = s.touches[i];
     if (touch.triangle < 0) continue;
     const auto give = [&](std::int32_t triangle, float share) {
-      for (int k = 0; k < 9; ++k) {
-        walls.impulse[std::size_t{9} * triangle + k] += share / 3 * touch.impulse[k % 3];
+      for (int a = 0; a < 3; ++a) {
+        walls.impulse[std::size_t{3} * triangle + a] += share / 3 * touch.impulse[a];
       }
     };
     const float* normal = s.now[touch.triangle].normal;
@@ -176,21 +176,23 @@ void collect_touches(const FluidState& s, const FluidView& view, FluidWalls& wal
 
 /// What pressure gives triangles in `time` goes to their corners likewise.
 void collect(FluidState& s, const FluidView& view, float time, FluidWalls& walls) {
-  constexpr int kChunks = 8,
-                kTriangles = 2048;  // whatever the number of threads, for the same bits
+  constexpr int kGrain = 1024;
+  constexpr std::int64_t kMostChunks = 8, kEntries = 1 << 16;
   const FluidLists& l = s.lists;
-  const int triangles = walls.size();
-  s.wall_impulse.resize(std::size_t{kChunks} * triangles);
-  const auto first = [&l](int chunk) {  // of particles that have as many entries in each
-    const auto entry =
-        static_cast<std::int32_t>(std::int64_t{l.wall_begin.back()} * chunk / kChunks);
+  const int triangles = walls.size(), met = static_cast<int>(l.met.size());
+  // Whatever the number of threads, for the same bits: with few entries few sums.
+  const std::int64_t entries = l.wall_begin.back();
+  const auto chunks = static_cast<int>(std::min(kMostChunks, entries / kEntries + 1));
+  s.wall_impulse.resize(std::size_t{1} * chunks * triangles);
+  const auto first = [&](int chunk) {  // of particles that have as many entries in each
+    const auto entry = static_cast<std::int32_t>(entries * chunk / chunks);
     return std::lower_bound(l.wall_begin.begin(), l.wall_begin.end() - 1, entry) -
            l.wall_begin.begin();
   };
-  s.cpu->for_each(kChunks, [&](int chunk) {
+  s.cpu->for_each(chunks, [&](int chunk) {
     float* sum = &s.wall_impulse[std::size_t{1} * chunk * triangles];
-    std::fill_n(sum, triangles, 0.0f);
-    const auto end = chunk + 1 < kChunks ? first(chunk + 1) : s.particles.size();
+    for (const std::int32_t t : l.met) sum[t] = 0;
+    const auto end = chunk + 1 < chunks ? first(chunk + 1) : s.particles.size();
     for (auto i = first(chunk); i < end; ++i) {
       const float strength = time * s.strength[i];
       if (strength == 0) continue;
@@ -199,25 +201,17 @@ void collect(FluidState& s, const FluidView& view, float time, FluidWalls& walls
       for (int e = 0; e < s.seen_count[i]; ++e) sum[triangle[e]] += strength * over[e];
     }
   });
-  s.cpu->for_each((triangles + kTriangles - 1) / kTriangles, [&](int chunk) {
-    const int begin = chunk * kTriangles, count = std::min(triangles - begin, kTriangles);
-    float* __restrict__ sum = s.wall_impulse.data() + begin;
-    for (int k = 1; k < kChunks; ++k) {
-      const float* part = s.wall_impulse.data() + std::size_t{1} * k * triangles + begin;
-      for (int t = 0; t < count; ++t) sum[t] += part[t];
-    }
-  });
   s.cpu->for_each(
-      static_cast<int>(l.met.size()),
+      met,
       [&](int m) {
         const std::int32_t t = l.met[m];
-        const float sum = s.wall_impulse[t];
-        if (sum == 0) return;
-        for (int i = 0; i < 9; ++i) {
-          walls.impulse[std::size_t{9} * t + i] -= sum * s.now[t].normal[i % 3] / 3;
+        float sum = 0;
+        for (int k = 0; k < chunks; ++k) sum += s.wall_impulse[std::size_t{1} * k * triangles + t];
+        for (int a = 0; a < 3; ++a) {
+          walls.impulse[std::size_t{3} * t + a] -= sum * s.now[t].normal[a] / 3;
         }
       },
-      256);
+      kGrain);
   collect_touches(s, view, walls);
 }
 
@@ -331,7 +325,7 @@ FluidSubstep fluid_substep(const FluidDrive& drive, int count,
 
 int advance_fluid(FluidState& s, const FluidDrive& drive, FluidWalls& walls,
                   std::vector<ColliderLoad>& loads) {
-  walls.impulse.resize(walls.end.size());
+  walls.impulse.resize(walls.end.size() / 3);
   if (s.particles.size() == 0) return 0;
   const int count = std::max(
       1,

@@ -25,7 +25,7 @@ class FluidDevice {
   /// As advance_fluid(), but for impulses().
   virtual int advance(const FluidState& state, const FluidDrive& drive,
                       std::vector<ColliderLoad>& loads) = 0;
-  /// Of the last advance(), on the GPU: three numbers a triangle, which each corner got [N s].
+  /// Of the last advance(), on the GPU, as Tissue::push_surface_on_gpu() takes them.
   virtual const float* impulses() const = 0;
   /// Puts them into FluidWalls::impulse.
   virtual void bring_impulses(FluidWalls& walls) = 0;

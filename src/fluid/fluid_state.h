@@ -36,7 +36,7 @@ struct FluidParticles {
 /// Triangles of tissue's surface over an interval: their corners move linearly, nine numbers each.
 struct FluidWalls {
   std::vector<float> begin, end;  ///< [m]
-  std::vector<float> impulse;     ///< of the fluid on each corner, since it was cleared [N s]
+  std::vector<float> impulse;  ///< as Tissue::push_surface() takes it, since it was cleared [N s]
   int size() const { return static_cast<int>(end.size() / 9); }
 };
 
@@ -118,8 +118,8 @@ double stable_fluid_step(const FluidState& state, float fastest);
 FluidSubstep fluid_substep(const FluidDrive& drive, int count,
                            const std::vector<Collider>& colliders);
 
-/// Advances the fluid; `walls` receive impulses on their corners, `loads` what acts on the
-/// colliders as the mean over the interval. Returns the number of substeps.
+/// Advances the fluid; `walls` receive impulses, `loads` what acts on the colliders as the mean over
+/// the interval. Returns the number of substeps.
 int advance_fluid(FluidState& state, const FluidDrive& drive, FluidWalls& walls,
                   std::vector<ColliderLoad>& loads);
 

@@ -154,7 +154,7 @@ using namespace lanes;  // NOLINT: what these sums are made of
 /// A share follows by its slope until it changed by so much, or what the slope leaves out, some
 /// slope times way^2 over the reach, is so much. With that ten times as large, drops at walls are
 /// kicked by it: a closed ball at 5 kPa fell to 4.0 as they left their order.
-constexpr float kKeepShare = 0.015f, kKeep = 1e-4f;
+constexpr float kKeepShare = 0.015f, kKeep = 3e-5f;
 
 /// Places of a triangle in `n` times `n` parts.
 struct Places {

@@ -98,16 +98,19 @@ void move_faces(const Faces& faces, const std::vector<std::array<float, 3>>& pla
       512);
 }
 
-/// Calls f(vertex, impulse) for the vertices of `faces` that impulses act on: of the corners of the
-/// triangles that put_faces() made of them. One after the other, by number.
+/// Calls f(vertex, impulse) for the vertices of `faces` that impulses act on, as
+/// Tissue::push_surface() takes them, of the triangles that put_faces() made. One after the other,
+/// by number.
 template <class Faces, class F>
 void for_pushed_vertices(const Faces& faces, std::size_t vertices, Span<const float> impulses,
                          const F& f) {
   std::vector<std::array<float, 3>> sum(vertices, {0, 0, 0});
   const float* impulse = impulses.data();
   for (const auto& face : faces) {
-    for (const int k : {0, 1, 2, 0, 2, 3}) {
-      for (float& to : sum[face.vertex[k]]) to += *impulse++;
+    for (int half = 0; half < 2; ++half, impulse += 3) {
+      for (const int k : {0, 1 + half, 2 + half}) {
+        for (int a = 0; a < 3; ++a) sum[face.vertex[k]][a] += impulse[a];
+      }
     }
   }
   for (std::size_t i = 0; i < vertices; ++i) {

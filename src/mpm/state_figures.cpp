@@ -208,7 +208,7 @@ void push_surface(MpmState& s, Span<const float> impulses) {
       static_cast<int>(push.size()),
       [&](int i) {
         for (std::int32_t e = by.corner_begin[i]; e < by.corner_begin[i + 1]; ++e) {
-          const float* impulse = impulses.data() + std::size_t{3} * by.corner[e];
+          const float* impulse = impulses.data() + std::size_t{3} * (by.corner[e] / 3);
           for (int a = 0; a < 3; ++a) push[i][a] += impulse[a];
         }
       },

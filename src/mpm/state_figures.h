@@ -68,7 +68,7 @@ void place_boundary(MpmState& s, const F& of_nodes) {
 }
 /// From the nodes on the host.
 void place_boundary(MpmState& state);
-/// Impulses on the corners of what it read last [N s] become velocity of the nodes.
+/// Tissue::push_surface().
 void push_surface(MpmState& state, Span<const float> impulses);
 
 /// Fills centroid (of the mass), velocity and box of all pieces.

@@ -113,8 +113,9 @@ void PbdTissue::push_surface(Span<const float> impulses) {
   const float* impulse = impulses.data();
   for (const Triangle& t : state_->triangles) {
     for (const std::int32_t i : t) {
-      for (int a = 0; a < 3; ++a) v.v[4 * i + a] += v.x[4 * i + 3] * *impulse++;
+      for (int a = 0; a < 3; ++a) v.v[4 * i + a] += v.x[4 * i + 3] * impulse[a];
     }
+    impulse += 3;
   }
   push();
 }

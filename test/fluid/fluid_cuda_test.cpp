@@ -93,7 +93,7 @@ TEST(FluidOnAGpu, MovesAsOnACpu) {
     return std::vector<Collider>{ball, plane};
   };
   std::vector<ColliderLoad> loads(2), gpu_loads(2);
-  on_cpu.walls.impulse.assign(on_cpu.walls.end.size(), 0);
+  on_cpu.walls.impulse.assign(on_cpu.walls.end.size() / 3, 0);
   EXPECT_EQ(advance_fluid(on_cpu.fluid, drive, on_cpu.walls, loads), 1);
   const std::unique_ptr<FluidDevice> device = make_fluid_on_gpu();
   device->send(on_gpu.fluid);

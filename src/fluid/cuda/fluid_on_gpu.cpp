@@ -75,7 +75,6 @@ class ParticlesOnGpu final : public FluidDevice {
   DeviceArray<FluidMost> most_;
   PinnedArray<FluidMost> host_most_;
   PinnedArray<unsigned long long> host_loads_;
-  PinnedArray<float> host_impulse_;
   PinnedArray<Collider> host_colliders_;
 };
 
@@ -320,15 +319,9 @@ void ParticlesOnGpu::set_walls(const float* corners, int triangles, bool are_new
 }
 
 void ParticlesOnGpu::bring_impulses(FluidWalls& walls) {
-  walls.impulse.resize(std::size_t{9} * triangles_);
-  host_impulse_.resize(impulse_.size());
-  impulse_.download(host_impulse_.data(), impulse_.size(), stream_);
+  walls.impulse.resize(impulse_.size());
+  impulse_.download(walls.impulse.data(), impulse_.size(), stream_);
   wait();
-  for (int t = 0; t < triangles_; ++t) {
-    for (int k = 0; k < 9; ++k) {
-      walls.impulse[std::size_t{9} * t + k] = host_impulse_[std::size_t{3} * t + k % 3];
-    }
-  }
 }
 
 int ParticlesOnGpu::advance(const FluidState& s, const FluidDrive& drive,

@@ -48,7 +48,7 @@ TEST(MpmSurface, TakesWhatPressesOnIt) {
   const Momentum before = tissue.momentum();
   // A pressure for a while that lets a skin of a millimetre gain 0.1 m/s.
   constexpr double kImpulse = 1000 * 0.001 * 0.1;
-  std::vector<float> impulses(surface.corners.size(), 0.0f);
+  std::vector<float> impulses(surface.corners.size() / 3, 0.0f);
   Vec3 sum = Vec3::Zero(), moment = Vec3::Zero();
   double sizes = 0;
   for (std::size_t t = 0; t < surface.point.size(); ++t) {
@@ -59,7 +59,7 @@ TEST(MpmSurface, TakesWhatPressesOnIt) {
     };
     const Vec3 each = -kImpulse / 6 * (corner(1) - corner(0)).cross(corner(2) - corner(0));
     for (int k = 0; k < 3; ++k) {
-      for (int a = 0; a < 3; ++a) impulses[9 * t + 3 * k + a] = static_cast<float>(each[a]);
+      impulses[3 * t + k] = static_cast<float>(each[k]);
       sum += each;
       moment += (corner(k) - before.centre).cross(each);
       sizes += each.norm();

@@ -13,7 +13,7 @@ namespace {
 
 /// Tissue that takes so many substeps a frame, several times what stiff and whole tissue does, or
 /// is in so many pieces is crushed: nothing is learnt from it from then on.
-constexpr int kMostSubsteps = 250, kMostPieces = 40;
+constexpr int kMostSubsteps = 40, kMostPieces = 40;
 
 double loose_share(const MpmTissue& tissue, double coarse_cell) {
   const std::vector<std::uint8_t> fragment = fragments_of(tissue, coarse_cell);
@@ -25,7 +25,14 @@ double loose_share(const MpmTissue& tissue, double coarse_cell) {
   return loose / all;
 }
 
-/// The fine points within each coarse one, by reference place.
+/// A sample that waits for its label.
+struct Waiting {
+  std::vector<std::int32_t> points;  ///< of one cell
+  int row;                           ///< in the samples
+};
+
+}  // namespace
+
 std::vector<std::vector<std::int32_t>> children(const MpmState& coarse, const MpmState& fine) {
   std::vector<std::vector<std::int32_t>> of(coarse.points.size());
   for (std::int32_t p = 0; p < fine.points.size(); ++p) {
@@ -39,14 +46,6 @@ std::vector<std::vector<std::int32_t>> children(const MpmState& coarse, const Mp
   }
   return of;
 }
-
-/// A sample that waits for its label.
-struct Waiting {
-  std::vector<std::int32_t> points;  ///< of one cell
-  int row;                           ///< in the samples
-};
-
-}  // namespace
 
 bool advance_frame(MpmTissue& tissue, const DatasetScene& scene, int frame, FrameResult* result) {
   FrameInput input;

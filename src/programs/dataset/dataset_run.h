@@ -44,6 +44,9 @@ bool advance_frame(MpmTissue& tissue, const DatasetScene& scene, int frame,
 /// Returns which pieces are, by id.
 std::vector<std::uint8_t> fragments_of(const MpmTissue& tissue, double coarse_cell);
 
+/// The points of a finer run within each of a coarse one's, by reference place.
+std::vector<std::vector<std::int32_t>> children(const MpmState& coarse, const MpmState& fine);
+
 /// Runs the scene twice. What the coarse run shows is labelled by what the truth comes to.
 DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions& options);
 

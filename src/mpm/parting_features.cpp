@@ -1,9 +1,7 @@
-#include "mpm/parting_features.h"
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <numeric>
 
+#include "mpm/fragment_features.h"
 #include "mpm/tear/tear.h"
 
 namespace tissue_sim {
@@ -56,10 +54,10 @@ int parting_features(const MpmState& state, const Pieces& pieces,
   static_assert(parting::kTearLength - parting::kAround == s::kEnd - s::kRegion, "all are taken");
   std::copy_n(all + s::kRegion, s::kEnd - s::kRegion, x + parting::kAround);
   const LatticeBody& body = state.bodies[state.points.site[point].body];
-  const double tear_length = body.material_of(state.points, point).tear_length;
-  x[parting::kTearLength] =
-      static_cast<float>(tear_length > 0 ? tear_length / body.cell_size : kTipBehind);
-  x[parting::kLimit] = tear_limit(state, point) - 1;
+  const Material& material = body.material_of(state.points, point);
+  x[parting::kTearLength] = static_cast<float>(
+      material.tear_length > 0 ? material.tear_length / body.cell_size : kTipBehind);
+  x[parting::kLimit] = static_cast<float>(material.tear_stretch - 1);
   x[parting::kAligned] = static_cast<float>(direction[axis] * direction[axis]);
   return axis;
 }

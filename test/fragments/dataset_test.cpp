@@ -5,8 +5,7 @@
 #include <vector>
 
 #include "fragments/features.h"
-#include "mpm/parting_features.h"
-#include "programs/dataset/parting_run.h"
+#include "programs/dataset/dataset_run.h"
 
 namespace tissue_sim {
 namespace {
@@ -17,36 +16,21 @@ DatasetOptions few_frames() {
   options.horizon = 4;
   options.per_frame = 20;
   options.level = 2;
+  options.truths = 2;
   return options;
 }
 
-TEST(Dataset, IsTheSameForTheSameSeed) {
-  const std::vector<std::string> kinds = {"tension", "cut"};
-  const auto run = [&](std::uint64_t seed) {
-    return run_dataset_scene(make_dataset_scene(seed, 1, kinds), few_frames());
-  };
-  const DatasetSamples one = run(5), again = run(5), other = run(6);
-  ASSERT_GT(one.q.size(), 20u);
-  EXPECT_EQ(one.x.size(), kAllFeatureCount * one.q.size());
-  EXPECT_EQ(one.x, again.x);
-  EXPECT_EQ(one.q, again.q);
-  EXPECT_EQ(one.df, again.df);
-  EXPECT_EQ(one.plain, again.plain);
-  EXPECT_EQ(one.about, again.about);
-  EXPECT_NE(one.x, other.x);
-}
-
-TEST(Dataset, SaysWhichBondsTruthsTear) {
+TEST(Dataset, SaysWhatTruthsTearTheSameForTheSameSeed) {
   const std::vector<std::string> kinds = {"anchored", "cut", "tension"};
   const auto run = [&](int index) {
-    return run_parting_scene(make_dataset_scene(5, index, kinds), few_frames(), 2);
+    return run_dataset_scene(make_dataset_scene(5, index, kinds), few_frames());
   };
   int torn = 0, whole = 0, differ = 0;
   for (int index = 0; index < 3; ++index) {
-    const PartingSamples one = run(index);
+    const DatasetSamples one = run(index);
     const std::size_t rows = one.torn.size() / 3;
     ASSERT_GT(rows, 10u) << kinds[index];
-    EXPECT_EQ(one.x.size(), rows * parting::kEnd);
+    EXPECT_EQ(one.x.size(), rows * kPartingFeatureCount);
     for (std::size_t i = 0; i < rows; ++i) {
       const std::uint8_t a = one.torn[3 * i + 1], b = one.torn[3 * i + 2];
       EXPECT_TRUE(one.torn[3 * i] <= 1 && (a <= 1 || a == kUnknown));
@@ -55,9 +39,10 @@ TEST(Dataset, SaysWhichBondsTruthsTear) {
       differ += a != b;
     }
     if (index > 0) continue;
-    const PartingSamples again = run(index);
+    const DatasetSamples again = run(index), other = run(index + 3);
     EXPECT_EQ(one.x, again.x);
     EXPECT_EQ(one.torn, again.torn);
+    EXPECT_NE(one.x, other.x);
   }
   EXPECT_GT(torn, 5);
   EXPECT_GT(whole, 20);

@@ -11,11 +11,9 @@
 #include <string>
 
 #include "fragments/features.h"
-#include "mpm/parting_features.h"
 #include "programs/dataset/dataset_run.h"
 #include "programs/dataset/npy.h"
 #include "programs/dataset/outcome.h"
-#include "programs/dataset/parting_run.h"
 
 namespace tissue_sim {
 namespace {
@@ -26,19 +24,17 @@ constexpr char kUsage[] =
   --first N        number of the first (0)
   --seed N         of all that is drawn (1)
   --kinds A,B      of tension, fall, compression, cut, blow, anchored, in turn (all)
-  --level N        how many times finer the truth is (3)
+  --level N        how many times finer truths are (3)
   --frames N       of each run, 1/960 s each (40)
   --horizon N      frames ahead that labels are for (8)
   --per-frame N    samples of a frame at most (100)
-  --truths N       data on bonds instead: which part, in N truths 0.95 to 1.05 times that fine
+  --truths N       how many, 0.95 to 1.05 times that fine (1)
   --converge N     no data: runs each scene with cells 1, 2 .. N times finer, and writes how each
                    comes out into FOLDER/convergence.csv
-  --compare FILE   no data: runs each scene plain, with fragment networks, with cells half as large
-                   and as the truth, and writes how each comes out into FOLDER/comparison.csv. FILE
+  --compare FILE   no data: runs each scene plain, with the network, with cells half as large and
+                   as the truth, and writes how each comes out into FOLDER/comparison.csv. FILE
                    is the network's
   --baselines FILE of threshold and logistic regression for that
-  --paper FILE     another network to compare, of the paper's features
-  --equal N        how many times finer cells take as long as the network (1.03)
 Scenes that are in FOLDER are left alone: the same command goes on with what is missing.
 One process does one scene after another: scripts/sweep shares them out over processes and machines.
 )";
@@ -47,7 +43,7 @@ struct Arguments {
   std::string out;
   ComparedRuns compared;
   std::vector<std::string> kinds = dataset_kinds();
-  int scenes = 60, first = 0, converge = 0, truths = 0;
+  int scenes = 60, first = 0, converge = 0;
   std::uint64_t seed = 1;
   DatasetOptions options;
 };
@@ -93,20 +89,13 @@ Arguments read_arguments(int argc, char** argv) {
     } else if (name == "--per-frame") {
       a.options.per_frame = number(1);
     } else if (name == "--truths") {
-      a.truths = number(1);
+      a.options.truths = number(1);
     } else if (name == "--converge") {
       a.converge = number(2);
     } else if (name == "--compare") {
       a.compared.network = std::filesystem::absolute(value);
     } else if (name == "--baselines") {
       a.compared.baselines = value;
-    } else if (name == "--paper") {
-      a.compared.paper = std::filesystem::absolute(value);
-    } else if (name == "--equal") {
-      a.compared.equal = std::stod(value);
-      if (!(a.compared.equal >= 1 && a.compared.equal <= 4)) {
-        throw std::invalid_argument("--equal is " + value + ": it must be from 1 to 4");
-      }
     } else if (name == "--kinds") {
       a.kinds.clear();
       std::istringstream list(value);
@@ -146,50 +135,22 @@ std::string describe(const DatasetScene& d, const DatasetOptions& options) {
   return out.str();
 }
 
-/// The same of what came out.
-std::string outcome_of(const DatasetSamples& samples) {
-  std::ostringstream out;
-  out.precision(9);
-  out << ", \"coarse_points\": " << samples.coarse_points
-      << ", \"true_points\": " << samples.true_points << ", \"frames\": " << samples.frames
-      << ", \"samples\": " << samples.q.size() << ", \"coarse_loose\": " << samples.coarse_loose
-      << ", \"true_loose\": " << samples.true_loose
-      << ", \"blew_up\": " << (samples.blew_up ? "true" : "false");
-  return out.str();
-}
-
 void write_scene(const Arguments& a, int index) {
   const std::string path = path_of(a, index, ".json"), unfinished = path + ".part";
   if (std::filesystem::exists(path)) return;
   const auto begin = std::chrono::steady_clock::now();
   const DatasetScene scene = make_dataset_scene(a.seed, index, a.kinds);
-  std::string outcome, said;
-  if (a.truths > 0) {
-    const PartingSamples samples = run_parting_scene(scene, a.options, a.truths);
-    write_npy(path_of(a, index, "_bonds.npy"), samples.x, parting::kEnd);
-    write_npy(path_of(a, index, "_torn.npy"), samples.torn, 1 + a.truths);
-    outcome = ", \"crushed\": " + std::to_string(samples.crushed);
-    said = std::to_string(samples.x.size() / parting::kEnd) + " samples, " +
-           std::to_string(samples.crushed) + " truths crushed";
-  } else {
-    const DatasetSamples samples = run_dataset_scene(scene, a.options);
-    write_npy(path_of(a, index, "_x.npy"), samples.x, kAllFeatureCount);
-    write_npy(path_of(a, index, "_q.npy"), samples.q, 0);
-    write_npy(path_of(a, index, "_df.npy"), samples.df, 9);
-    write_npy(path_of(a, index, "_plain.npy"), samples.plain, 0);
-    write_npy(path_of(a, index, "_about.npy"), samples.about, 3);
-    outcome = outcome_of(samples);
-    said = std::to_string(samples.q.size()) + " samples, " +
-           std::to_string(std::count(samples.q.begin(), samples.q.end(), 1)) + " of fragments" +
-           (samples.blew_up ? " (blew up)" : "");
-  }
+  const DatasetSamples samples = run_dataset_scene(scene, a.options);
+  write_npy(path_of(a, index, "_x.npy"), samples.x, kPartingFeatureCount);
+  write_npy(path_of(a, index, "_torn.npy"), samples.torn, 1 + a.options.truths);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
   // Last, and whole at once: where it is, the others are.
-  std::ofstream(unfinished) << describe(scene, a.options) << outcome
+  std::ofstream(unfinished) << describe(scene, a.options) << ", \"crushed\": " << samples.crushed
                             << ", \"seconds\": " << took.count() << "}\n";
   std::filesystem::rename(unfinished, path);
-  std::printf("scene %d of %d, %s: %s, %.1f s\n", index - a.first + 1, a.scenes, scene.kind.c_str(),
-              said.c_str(), took.count());
+  std::printf("scene %d of %d, %s: %zu samples, %d truths crushed, %.1f s\n", index - a.first + 1,
+              a.scenes, scene.kind.c_str(), samples.x.size() / kPartingFeatureCount,
+              samples.crushed, took.count());
   std::fflush(stdout);
 }
 

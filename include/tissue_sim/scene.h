@@ -160,7 +160,7 @@ struct Scene : OptionSets {
   Vec3 gravity = Vec3(0, 0, -9.81);  ///< [m/s^2]
   std::uint64_t seed = 0;
   /// Method mpm: file of a fragment network (scripts/train_fragments) that says each frame which
-  /// points of tissue that tears will be part of fragments; `off` for none.
+  /// cells of tissue that tears will part: cracks begin there sooner; `off` for none.
   std::string fragment_network = "off";
   Ground ground;
   std::vector<Material> materials;

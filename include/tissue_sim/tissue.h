@@ -52,7 +52,7 @@ struct FrameResult {
   int substeps = 0;
   double substep = 0;           ///< the longest of them [s]
   int fragment_candidates = 0;  ///< points that the fragment network looked at
-  int fragment_points = 0;      ///< of these, those that it expects to be part of fragments
+  int fragment_points = 0;      ///< of these, those that it expects to part
   double kinetic_energy = 0;    ///< [J]
   double elastic_energy = 0;    ///< [J]
   double cutting_work = 0;      ///< of blades in tissue that resists: toughness times area [J]

@@ -1,6 +1,6 @@
-// What the fragment network is told of a point: the features of the 2024 paper (Sung, Kim and Shin,
-// Electronics 13:1340, section 2.1; in space instead of a plane), and what was found to be missing
-// among them.
+// What the fragment network is told of a cell that may part across its largest stretch, and what
+// that is made from: the features of the 2024 paper (Sung, Kim and Shin, Electronics 13:1340,
+// section 2.1; in space instead of a plane), and what was found to be missing among them.
 #pragma once
 
 namespace tissue_sim {
@@ -36,5 +36,26 @@ inline constexpr int kParting = kSpeed + 1;     ///< the part of it that leads a
 inline constexpr int kEnd = kParting + 1;
 }  // namespace surroundings
 inline constexpr int kAllFeatureCount = surroundings::kEnd;
+
+/// The network's: invariants, whatever the axes of the lattice and of the world. Neighbours are
+/// those along the lattice's axis nearest to the largest stretch, the more strained one first, then
+/// the four beside it in the same order.
+namespace parting {
+inline constexpr int kExcess = 0;                  ///< largest strain, as the neighbours' below
+inline constexpr int kOther = 1;                   ///< [2] the cell's other strains
+inline constexpr int kRate = 3;                    ///< of the largest, in h / c
+inline constexpr int kBrokenInside = 4;            ///< share of the bonds in the cell
+inline constexpr int kAlong = 5;                   ///< [2] excess, 0 where there is no neighbour
+inline constexpr int kBrokenAlong = kAlong + 2;    ///< [2] share of the bonds that lead there
+inline constexpr int kBeside = kBrokenAlong + 2;   ///< [4] excess
+inline constexpr int kBrokenBeside = kBeside + 4;  ///< [4]
+inline constexpr int kThere = kBrokenBeside + 4;   ///< [2] share of the neighbours that are there
+inline constexpr int kAround = kThere + 2;         ///< [14] surroundings::kRegion to kParting
+inline constexpr int kTearLength = kAround + 14;   ///< in cells
+inline constexpr int kLimit = kTearLength + 1;     ///< strain that it bears
+inline constexpr int kAligned = kLimit + 1;        ///< cosine of the stretch and the axis, squared
+inline constexpr int kEnd = kAligned + 1;
+}  // namespace parting
+inline constexpr int kPartingFeatureCount = parting::kEnd;
 
 }  // namespace tissue_sim

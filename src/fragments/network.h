@@ -1,7 +1,6 @@
-// The fragment network: two networks of one hidden layer each (Sung, Kim and Shin, Electronics
-// 13:1340, 2024, section 2.1), as functions for host and device. Tanh is on the hidden layer only:
-// on the outputs, as printed, it would bound probabilities to 0.12 .. 0.88 and leave variances
-// below zero.
+// The fragment network: one hidden layer, as in Sung, Kim and Shin, Electronics 13:1340, 2024,
+// section 2.1, as functions for host and device. Tanh is on the hidden layer only: on the outputs,
+// as printed, it would bound probabilities to 0.12 .. 0.88.
 #pragma once
 
 #include <cmath>
@@ -11,24 +10,17 @@
 
 namespace tissue_sim {
 
-inline constexpr int hidden_count(int inputs) { return inputs * 3 / 2; }
-inline constexpr int kHiddenCount = hidden_count(kFeatureCount);
-inline constexpr int kMostHidden = hidden_count(kAllFeatureCount);
-/// Of the classifier: of not being part of a fragment, of being part of one. Their softmax is the
-/// probability.
-inline constexpr int kClassifierOutputs = 2;
-/// Of the modifier: mean of the change of F, row by row, and the ln of its variance.
-inline constexpr int kModifierOutputs = 18;
+inline constexpr int kHiddenCount = kPartingFeatureCount * 3 / 2;
+/// Of not parting, of parting: their softmax is the probability.
+inline constexpr int kOutputs = 2;
 
-/// Weights of one network, as functions read them: of a layer's inputs, one after the other, those
-/// to all outputs side by side.
+/// Its weights, as functions read them: of a layer's inputs, one after the other, those to all
+/// outputs side by side.
 struct NetworkWeights {
-  int inputs;  ///< kFeatureCount, or kAllFeatureCount; there are 1.5 times as many hidden
-  int first;   ///< of them that has a weight at all
-  const float* hidden_weights;  ///< [inputs][hidden]
-  const float* hidden_biases;   ///< [hidden]
-  const float* output_weights;  ///< [hidden][outputs]
-  const float* output_biases;   ///< [outputs]
+  const float* hidden_weights;  ///< [kPartingFeatureCount][kHiddenCount]
+  const float* hidden_biases;   ///< [kHiddenCount]
+  const float* output_weights;  ///< [kHiddenCount][kOutputs]
+  const float* output_biases;   ///< [kOutputs]
 };
 
 /// tanh x within 3e-7, with the same bits wherever it is worked out without fused operations: the
@@ -50,29 +42,27 @@ TISSUE_SIM_INLINE float hidden_tanh(float x) {
   return x * p / q;
 }
 
-/// What a network says of features x[inputs].
-template <int kOutputs>
+/// What the network says of features x[kPartingFeatureCount].
 TISSUE_SIM_INLINE void run_network(const NetworkWeights& w, const float* x,
                                    float (&out)[kOutputs]) {
-  const int count = hidden_count(w.inputs);
-  float hidden[kMostHidden];
-  for (int h = 0; h < count; ++h) hidden[h] = w.hidden_biases[h];
-  for (int i = w.first; i < w.inputs; ++i) {
-    const float* weights = w.hidden_weights + i * count;
-    for (int h = 0; h < count; ++h) hidden[h] += x[i] * weights[h];
+  float hidden[kHiddenCount];
+  for (int h = 0; h < kHiddenCount; ++h) hidden[h] = w.hidden_biases[h];
+  for (int i = 0; i < kPartingFeatureCount; ++i) {
+    const float* weights = w.hidden_weights + i * kHiddenCount;
+    for (int h = 0; h < kHiddenCount; ++h) hidden[h] += x[i] * weights[h];
   }
-  for (int h = 0; h < count; ++h) hidden[h] = hidden_tanh(hidden[h]);
+  for (int h = 0; h < kHiddenCount; ++h) hidden[h] = hidden_tanh(hidden[h]);
   for (int o = 0; o < kOutputs; ++o) out[o] = w.output_biases[o];
-  for (int h = 0; h < count; ++h) {
+  for (int h = 0; h < kHiddenCount; ++h) {
     const float* weights = w.output_weights + h * kOutputs;
     for (int o = 0; o < kOutputs; ++o) out[o] += hidden[h] * weights[o];
   }
 }
 
-/// Probability that the point of these features is part of a fragment within the horizon.
-TISSUE_SIM_INLINE float fragment_probability(const NetworkWeights& classifier, const float* x) {
-  float out[kClassifierOutputs];
-  run_network(classifier, x, out);
+/// Probability that the cell of these features parts within the horizon.
+TISSUE_SIM_INLINE float parting_probability(const NetworkWeights& network, const float* x) {
+  float out[kOutputs];
+  run_network(network, x, out);
   return 1 / (1 + std::exp(out[0] - out[1]));
 }
 

@@ -2,7 +2,6 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -70,38 +69,28 @@ FragmentNetwork::FragmentNetwork(const std::string& path) {
   }
   try {
     const YAML::Node file = load_yaml(read_file(path, kLargestScene));
-    const std::string version =
-        file.IsMap() && file["version"] ? file["version"].as<std::string>() : "";
-    if (version != "1" && version != "2") {
-      throw std::invalid_argument("it must be a fragment network of version 1 or 2");
+    if (!file.IsMap() || !file["version"] || file["version"].as<std::string>() != "3") {
+      throw std::invalid_argument("it must be a fragment network of version 3");
     }
-    inputs_ = version == "1" ? kFeatureCount : kAllFeatureCount;
-    const int inputs = inputs_, hidden = hidden_count(inputs);
+    const YAML::Node node = file["classifier"];
+    if (!node || !node.IsMap()) throw std::invalid_argument("classifier is missing");
+    const std::vector<int> shape = {kPartingFeatureCount, kHiddenCount, kOutputs};
+    if (node["shape"].as<std::vector<int>>() != shape) {
+      throw std::invalid_argument("classifier has another shape than " +
+                                  std::to_string(kPartingFeatureCount) + ", " +
+                                  std::to_string(kHiddenCount) + ", " + std::to_string(kOutputs));
+    }
     WeightsSum sum;
-    const auto read = [&](const std::string& name, int outputs, Layers& layers) {
-      const YAML::Node node = file[name];
-      if (!node || !node.IsMap()) throw std::invalid_argument(name + " is missing");
-      const auto shape = node["shape"].as<std::vector<int>>();
-      if (shape != std::vector<int>{inputs, hidden, outputs}) {
-        throw std::invalid_argument(name + " has another shape than " + std::to_string(inputs) +
-                                    ", " + std::to_string(hidden) + ", " + std::to_string(outputs));
-      }
-      const auto part = [&](const char* key, int rows, int columns) {
-        std::vector<float> values =
-            numbers(node[key], name + "." + key, static_cast<std::size_t>(rows) * columns);
-        sum.add(values);
-        return transposed(values, rows, columns);
-      };
-      layers.hidden_weights = part("hidden_weights", hidden, inputs);
-      const auto used = std::find_if(layers.hidden_weights.begin(), layers.hidden_weights.end(),
-                                     [](float w) { return w != 0; });
-      layers.first = static_cast<int>(used - layers.hidden_weights.begin()) / hidden;
-      layers.hidden_biases = part("hidden_biases", hidden, 1);
-      layers.output_weights = part("output_weights", outputs, hidden);
-      layers.output_biases = part("output_biases", outputs, 1);
+    const auto part = [&](const char* key, int rows, int columns) {
+      const std::vector<float> values = numbers(node[key], std::string("classifier.") + key,
+                                                static_cast<std::size_t>(rows) * columns);
+      sum.add(values);
+      return transposed(values, rows, columns);
     };
-    read("classifier", kClassifierOutputs, classifier_);
-    read("modifier", kModifierOutputs, modifier_);
+    hidden_weights_ = part("hidden_weights", kHiddenCount, kPartingFeatureCount);
+    hidden_biases_ = part("hidden_biases", kHiddenCount, 1);
+    output_weights_ = part("output_weights", kOutputs, kHiddenCount);
+    output_biases_ = part("output_biases", kOutputs, 1);
     horizon_ = file["horizon"].as<double>();
     if (!(horizon_ > 0)) throw std::invalid_argument("horizon must be above 0");
     if (file["threshold"]) threshold_ = file["threshold"].as<double>();

@@ -8,41 +8,26 @@
 
 namespace tissue_sim {
 
-/// Both networks, as read from a file.
+/// The network, as read from a file.
 class FragmentNetwork {
  public:
-  /// Reads a file (YAML). Throws std::invalid_argument with the path in front: no such file, no
-  /// version 1 (the 70 features of the paper) or 2 (all features), a shape that is not that of
-  /// the version (70 x 105 x 2 and 18, 101 x 151 x 2 and 18), numbers missing or not finite, a
-  /// checksum that is not theirs.
+  /// Reads a file (YAML). Throws std::invalid_argument with the path in front: no such file, not
+  /// version 3 (versions 1 and 2 foresaw points of fragments, not bonds), a shape that is not
+  /// [kPartingFeatureCount, kHiddenCount, kOutputs], numbers missing or not finite, a checksum that
+  /// is not theirs.
   explicit FragmentNetwork(const std::string& path);
 
-  NetworkWeights classifier() const { return classifier_.view(inputs_); }
-  NetworkWeights modifier() const { return modifier_.view(inputs_); }
-  /// Features that it takes: kFeatureCount or kAllFeatureCount.
-  int inputs() const { return inputs_; }
+  NetworkWeights weights() const {
+    return {hidden_weights_.data(), hidden_biases_.data(), output_weights_.data(),
+            output_biases_.data()};
+  }
   /// How far ahead it looks [s].
   double horizon() const { return horizon_; }
-  /// Probability from which on a point is expected to be part of a fragment; half unless the file
-  /// says so, for fragments are rare.
+  /// Probability from which on a cell is expected to part; half unless the file says so.
   double threshold() const { return threshold_; }
 
  private:
-  struct Layers {
-    std::vector<float> hidden_weights, hidden_biases, output_weights, output_biases;
-    int first = 0;
-    NetworkWeights view(int inputs) const {
-      return {inputs,
-              first,
-              hidden_weights.data(),
-              hidden_biases.data(),
-              output_weights.data(),
-              output_biases.data()};
-    }
-  };
-
-  Layers classifier_, modifier_;
-  int inputs_ = kFeatureCount;
+  std::vector<float> hidden_weights_, hidden_biases_, output_weights_, output_biases_;
   double horizon_ = 0, threshold_ = 0.5;
 };
 

@@ -11,7 +11,7 @@ namespace {
 
 constexpr char kMagic[16] = "tissue_sim\nstat";
 /// Of all that is written in a state. Whoever changes what a `fields()` lists counts on.
-constexpr std::uint32_t kVersion = 6;
+constexpr std::uint32_t kVersion = 7;
 
 struct Head {
   char magic[16];

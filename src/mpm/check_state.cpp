@@ -259,14 +259,10 @@ void complete_tissue(MpmState& s) {
               "tears");
   check_indices(s.bridge_ends, 0, k.points, "tears");
   check_indices(s.debris, 0, k.points, "debris");
-  for (const FragmentFlight& f : s.flights) {
-    check_sizes("flights", f.nodes, f.home, f.from_centre);
-    check_indices(f.nodes, 0, k.nodes, "flights");
-  }
+  check_indices(s.expected, 0, k.points, "points expected to part");
   check_blocks(s, k);
   check_kept(s, k);
   s.fields->follow(s.bodies, s.points);
-  index_flights(s);
   list_front_cells(s);
   mark_row_nodes(s.nodes.size(), s.anchors);
 }

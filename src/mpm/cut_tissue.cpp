@@ -34,7 +34,6 @@ Apart take_apart(MpmState& state, const std::vector<std::int32_t>& changed,
                  const std::function<void()>& meanwhile) {
   Apart apart;
   if (changed.empty()) return apart;
-  land_changed(state, changed);
   std::vector<NodeFields::Cell> cells;
   Softened softened;
   state.cpu->both(

@@ -111,9 +111,8 @@ class MpmDevice {
   virtual GpuSurface place_boundary_on_gpu() { return {}; }
   virtual void push_boundary_on_gpu(const float* /*impulses*/) {}
 
-  /// The end of a frame with a fragment network: pieces begin to fly. Lists the points that are
-  /// strained, and returns whether any piece moved.
-  virtual bool fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) = 0;
+  /// The points that the fragment network may look at, with their nodes brought.
+  virtual std::vector<StrainedPoint> strained() = 0;
 
   virtual int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) = 0;
   virtual GpuPoints read_points_on_gpu(const PointSelection& /*selection*/) { return {}; }

@@ -128,7 +128,7 @@ void surrounding_features(const MpmState& state, const Pieces& pieces,
   const LatticeBody& body = state.bodies[s.body];
   std::int32_t own[8];
   points_of_cell(body, s.x, s.y, s.z, own);
-  const double bears = tear_limit(state, point) - 1;
+  const double bears = body.material_of(state.points, point).tear_stretch - 1;
   Vec3 direction = Vec3::Zero();
   for (int cell = 0; cell < kFeatureCells; ++cell) {
     if (x[cell * kFeaturesOfCell + 9] == 0) continue;

@@ -1,4 +1,4 @@
-// What the fragment network is told of a point of the lattice: fragments/features.h.
+// What the fragment network is told of a cell of the lattice: fragments/features.h.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,15 +12,18 @@
 
 namespace tissue_sim {
 
+/// Of the 27 nodes that a point sees, the one at the middle of its cell.
+inline constexpr int kMiddleNode = 13;
+
 /// A point that is strained.
 struct StrainedPoint {
   std::int32_t point = -1;
-  float excess = 0;         ///< largest principal strain over that of the limit
+  float excess = 0;         ///< largest principal strain over that which its material bears
   std::uint8_t across = 0;  ///< bit a: bonds along axis a lead across the crack that may open there
 };
 
 /// Of the points that find_stretched() lists, those of tissue that may tear whose strain is at
-/// least `share` of their own limit's.
+/// least `share` of what their material bears, whatever its scatter.
 std::vector<StrainedPoint> strained_of(const MpmState& state,
                                        const std::vector<StretchedPoint>& stretched, double share);
 /// All such points.
@@ -65,7 +68,12 @@ void fragment_features(const MpmState& state, std::int32_t point, float* x);
 void surrounding_features(const MpmState& state, const Pieces& pieces,
                           const FragmentSurroundings& around, std::int32_t point, float* x);
 
-/// Points that may soon be part of a fragment. Those of one cell that see one field have the same
+/// The network's features of a point's cell, x[kPartingFeatureCount]. Returns the axis (0 x, 1 y, 2
+/// z) nearest to its largest stretch.
+int parting_features(const MpmState& state, const Pieces& pieces,
+                     const FragmentSurroundings& around, std::int32_t point, float* x);
+
+/// Points that may soon part. Those of one cell that see one field have the same
 /// features: they are one group, and asked for together.
 struct FragmentCandidates {
   std::vector<std::int32_t> points;  ///< group by group, by number in each

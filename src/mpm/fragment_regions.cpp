@@ -105,14 +105,15 @@ std::vector<StrainedPoint> strained_of(const MpmState& state,
       [&](int i) {
         const StretchedPoint& p = stretched[i];
         const LatticeBody& body = state.bodies[state.points.site[p.point].body];
-        if (least_tear_limit(body.material_of(state.points, p.point)) == 0) return;
+        const Material& material = body.material_of(state.points, p.point);
+        if (least_tear_limit(material) == 0) return;
         Eigen::Matrix3d C;
         C << p.C[0], p.C[3], p.C[4], p.C[3], p.C[1], p.C[5], p.C[4], p.C[5], p.C[2];
         if (!C.allFinite()) return;
         Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
         solver.computeDirect(C, Eigen::EigenvaluesOnly);
         const double most = solver.eigenvalues()[2];
-        const double excess = (std::sqrt(most) - 1) / (tear_limit(state, p.point) - 1);
+        const double excess = (std::sqrt(most) - 1) / (material.tear_stretch - 1);
         if (excess < share) return;
         std::uint8_t across = 0;
         for (int a = 0; a < 3; ++a) across |= (p.C[a] - 1 >= kStretchedAlong * (most - 1)) << a;

@@ -133,7 +133,6 @@ float substep(MpmState& state, float dt, std::vector<ColliderLoad>& loads,
     move_held(state.anchors, dt, before, after, state.nodes);
     state.anchors.now = anchors;
   }
-  fly(state, step);
   add_inertial_loads(state, step.kick, loads);
   for (const auto& of_block : state.work.block_loads) {
     for (std::size_t c = 0; c < of_block.size(); ++c) loads[c].add(of_block[c]);

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "mpm/contact/touching_tissue.h"
-#include "mpm/fragment_flight.h"
 #include "mpm/surface/boundary_mesh.h"
 #include "mpm/tear/tear.h"
 #include "tissue_sim/tissue.h"
@@ -31,21 +30,19 @@ struct BlockWork {
 
 /// The state of the tissue, and how it is worked on.
 struct MpmState : TouchingTissue, TearRecords {
-  float worst_stiffening = 1;                ///< BlockState's, of all blocks
-  std::vector<FragmentFlight> flights;       ///< pieces that fly
-  std::vector<std::int32_t> flight_of_node;  ///< -1 for none; empty while none flies
-  BoundaryMesh boundary;                     ///< as it was last read
+  float worst_stiffening = 1;  ///< BlockState's, of all blocks
+  BoundaryMesh boundary;       ///< as it was last read
   BlockWork work;
 };
 
 /// All that a substep changes but contact of tissue with tissue, which each device has in its way:
 /// `Motion m = motion_of(state)` keeps it, `motion_of(state) = m` puts it back.
 using Motion = std::tuple<NodeMotion, FrontMotion, AnchorFaceMotion, double, float, Contacts,
-                          std::vector<FragmentFlight>, std::vector<EdgeHold>>;
+                          std::vector<EdgeHold>>;
 inline std::tuple<NodeMotion&, FrontMotion&, AnchorFaceMotion&, double&, float&, Contacts&,
-                  std::vector<FragmentFlight>&, std::vector<EdgeHold>&>
+                  std::vector<EdgeHold>&>
 motion_of(MpmState& s) {
-  return {s.nodes, s.front, s.anchors, s.time, s.dt, s.contacts, s.flights, s.edges.holds};
+  return {s.nodes, s.front, s.anchors, s.time, s.dt, s.contacts, s.edges.holds};
 }
 /// All that a cut changes, in the same way.
 inline std::tuple<NodeMasses&, PointBonds&, NodeFields&, Blocks&, FrontNodes&, AnchorRows&>

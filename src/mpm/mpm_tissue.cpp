@@ -70,13 +70,7 @@ FrameResult MpmTissue::finish() {
   result.blew_up = result.blew_up || is_out_of_control(result);
   if (tame()) measure_and_follow(kMeasureEnergies);
   if (foresight_.network != nullptr && !result.blew_up) {
-    const double duration = run_->frame ? run_->frame->duration : 0.0;
-    std::vector<StrainedPoint> strained;
-    if (device_->fly(duration, foresight_, strained)) {
-      substep_.acceptance().begin_with(NAN);
-      measure_and_follow(kMeasureMotion | kMeasureEnergies);
-    }
-    look_ahead(s, run_->pieces, std::move(strained), duration, foresight_, result);
+    look_ahead(s, run_->pieces, device_->strained(), foresight_, result);
   }
   measured_ = followed_ = pieces_measured_ = false;
   return result;
@@ -149,7 +143,6 @@ void MpmTissue::each_field(Archive& archive) {
   archive.part("pieces", run_->pieces, pieces_measured_);
   archive.part("substeps", run_->stiffening, run_->modulus, substep_);
   archive.part("measures", measured_, has_energies_, run_->work);
-  archive.part("forecast", foresight_.said, foresight_.waiting, foresight_.flown);
 }
 
 std::vector<std::uint8_t> MpmTissue::save() {
@@ -162,22 +155,13 @@ std::vector<std::uint8_t> MpmTissue::save() {
 namespace {
 
 /// What a state that was read says beside MpmState.
-void check_figures(const MpmRun& run, const Foresight& foresight, bool measured) {
+void check_figures(const MpmRun& run, bool measured) {
   const MpmState& s = run.state;
   check_sizes("stiffening", s.bodies, run.stiffening);
   for (std::size_t i = 0; i < s.bodies.size(); ++i) {
     check_state(run.stiffening[i].size() == s.bodies[i].materials.size() + 1, "stiffening");
   }
   check_state(!measured || run.modulus.size() == s.blocks.all.size(), "stiffness");
-  for (const FragmentChance& chance : foresight.said) {
-    check_state(chance.point >= 0 && chance.point < s.points.size(), "forecast");
-  }
-  for (const WaitingFragment& w : foresight.waiting) {
-    check_state(w.piece >= 0 && w.piece < run.pieces.next_id, "forecast");
-  }
-  for (const FragmentFlight& f : s.flights) {
-    check_state(f.piece >= 0 && f.piece < run.pieces.next_id, "flights");
-  }
 }
 
 }  // namespace
@@ -188,7 +172,7 @@ void MpmTissue::restore(Span<const std::uint8_t> saved) {
   if (in.left() > 0) throw std::runtime_error("the state has more to it than this version knows");
   followed_ = measured_;
   check_pieces(run_->pieces, state().points.site.size(), state().scene.bodies.size());
-  check_figures(*run_, foresight_, measured_);
+  check_figures(*run_, measured_);
   device_->restored();
 }
 

@@ -43,7 +43,7 @@ inline Scene torn_bar(int points, int threads) {
 template <class AnyTissue, class Push>
 void run_torn_bar(benchmark::State& bench, Scene scene, bool network, const Push& push) {
   const TemporaryFolder folder;  // what the weights say takes as long whatever they are
-  if (network) scene.fragment_network = folder.write("network.yaml", network_text(2));
+  if (network) scene.fragment_network = folder.write("network.yaml", network_text());
   double candidates = 0, frames = 0, processor = 0;  // [s]: what other programs take is not in it
   for (auto _ : bench) {
     AnyTissue tissue(scene);
@@ -70,7 +70,6 @@ void run_torn_bar(benchmark::State& bench, Scene scene, bool network, const Push
     bench.SetIterationTime(seconds);
     bench.counters["pieces"] = tissue.fragment_count();
     bench.counters["points"] = tissue.point_count();
-    bench.counters["flown"] = tissue.foresight().flown;
   }
   bench.SetItemsProcessed(static_cast<std::int64_t>(frames));
   bench.counters["processor_ms_a_frame"] = 1000 * processor / frames;

@@ -20,21 +20,13 @@ namespace {
 const TemporaryFolder folder;
 const std::string kFile = folder.write("network.yaml", network_text());
 
-template <int kOutputs>
-void expect_sines(const NetworkWeights& weights, const double (&expected)[kOutputs]) {
-  float x[kFeatureCount], out[kOutputs];
-  for (int i = 0; i < kFeatureCount; ++i) x[i] = static_cast<float>(std::sin(i));
-  run_network(weights, x, out);
-  for (int o = 0; o < kOutputs; ++o) EXPECT_NEAR(out[o], expected[o], 5e-6) << o;
-}
-
 TEST(FragmentNetwork, SaysWhatNumpySays) {  // of the same weights, in double, for x_i = sin i
   const FragmentNetwork network(kFile);
-  expect_sines(network.classifier(), {-0.3129961, 0.2100686});
-  expect_sines(network.modifier(),
-               {-0.2382367, 0.5305393, -0.0704033, 0.4983727, 0.0595657, 0.4662061, 0.0273990,
-                0.4533277, -0.1716237, 0.4211611, -0.1198113, 0.3309144, -0.1519779, 0.4140201,
-                -0.0367703, 0.3818535, -0.0655786, 0.2080243});
+  float x[kPartingFeatureCount], out[kOutputs];
+  for (int i = 0; i < kPartingFeatureCount; ++i) x[i] = static_cast<float>(std::sin(i));
+  run_network(network.weights(), x, out);
+  EXPECT_NEAR(out[0], -0.05491508, 5e-6);
+  EXPECT_NEAR(out[1], 0.11494144, 5e-6);
   EXPECT_NEAR(network.horizon(), 1.0 / 120, 1e-9);
 }
 
@@ -66,13 +58,12 @@ TEST(FragmentNetwork, RefusesFilesThatAreNotWhole) {
   const auto says = [](const std::string& why, const char* what) {
     EXPECT_NE(why.find(what), std::string::npos) << why;
   };
-  says(changed("version: 1", "version: 3"), "version 1");
-  says(changed("version: 1", "version: 2"), "shape");
-  says(changed("shape: [70, 105, 2]", "shape: [70, 100, 2]"), "shape");
-  says(changed("hidden_weights: [", "hidden_weights: [0.5, "), "it must be 7350");
+  says(changed("version: 3", "version: 2"), "version 3");
+  says(changed("shape: [36, 54, 2]", "shape: [36, 50, 2]"), "shape");
+  says(changed("hidden_weights: [", "hidden_weights: [0.5, "), "it must be 1944");
   says(changed("hidden_biases: [\n    ", "hidden_biases: [\n    1"), "checksum");
-  says(changed("modifier:", "other:"), "modifier is missing");
-  says(why_refused(""), "version 1");
+  says(changed("classifier:", "other:"), "classifier is missing");
+  says(why_refused(""), "version 3");
   says(why_refused("[1, 2"), "no fragment network");
   EXPECT_THROW(FragmentNetwork("/no/such/file"), std::invalid_argument);
 }
@@ -242,57 +233,57 @@ TEST(FragmentFeatures, CountBrokenBonds) {
   EXPECT_NEAR(f[kRegion], 0.5, 1e-6);
 }
 
-struct ReportedRun {
-  std::vector<std::uint64_t> checksums;
-  std::vector<float> chances;
-  std::vector<int> flown;
-  int candidates = 0, points = 0;
-};
-
-ReportedRun run_reported(const std::string& network, int threads) {
+/// Features of the middle of a box that is stretched along one axis and notched along the next.
+std::vector<float> features_along(int axis) {
+  const auto in_axes = [&](double x, double y, double z) {
+    Vec3 v;
+    v[axis] = x;
+    v[(axis + 1) % 3] = y;
+    v[(axis + 2) % 3] = z;
+    return v;
+  };
   Scene scene = tearing_box();
-  scene.device = Device::kCpu;
-  scene.fragment_network = network;
-  scene.threads = threads;
-  Simulation simulation(scene);
-  auto& tissue = dynamic_cast<MpmTissue&>(simulation.tissue());
+  scene.bodies[0].size = in_axes(0.016, 0.012, 0.012);
+  scene.bodies[0].pose.position = in_axes(0.008, 0.006, 0.006);
+  MpmTissue tissue(scene);
   MpmState& s = tissue.state();
-  for (const LatticeBody& b : s.bodies) {
-    b.for_each_node([&](int node, int i, int j, int k) {
-      s.nodes.v[0][node] = static_cast<float>(120 * (b.node_position(i, j, k).x() - 0.008));
-    });
-  }
-  ReportedRun run;
-  for (int frame = 0; frame < 4; ++frame) {
-    const FrameReport report = simulation.advance_frame();
-    run.candidates += report.result.fragment_candidates;
-    run.points += report.result.fragment_points;
-    run.checksums.push_back(tissue.checksum());
-    run.flown.push_back(tissue.foresight().flown);
-    for (const FragmentChance& c : tissue.foresight().forecast) {
-      run.chances.push_back(c.probability);
+  const LatticeBody& body = s.bodies[0];
+  for (int y = 0; y < 4; ++y) {  // a notch from its side, between two cells
+    for (int z = 0; z < 12; ++z) {
+      const Vec3 at = in_axes(7, y, z), other = in_axes(8, y, z);
+      const auto point = [&](const Vec3& v) {
+        return body.point(static_cast<int>(v.x()), static_cast<int>(v.y()),
+                          static_cast<int>(v.z()));
+      };
+      break_bond(kForwardBond + axis, s.points.bonds[point(at)], s.points.bonds[point(other)]);
     }
   }
-  return run;
+  body.for_each_node([&](int node, int i, int j, int k) {
+    const double x = body.node_position(i, j, k)[axis];
+    s.nodes.u[axis][node] = static_cast<float>(0.1 * x + 10 * x * x);
+  });
+  measure_motion(s);
+  std::vector<float> x(kPartingFeatureCount);
+  const Vec3 at = in_axes(8, 4, 6);
+  const std::int32_t point =
+      body.point(static_cast<int>(at.x()), static_cast<int>(at.y()), static_cast<int>(at.z()));
+  const FragmentSurroundings around =
+      fragment_surroundings(s, tissue.pieces(), find_strained(s, kRegionLevels[0]));
+  EXPECT_EQ(parting_features(s, tissue.pieces(), around, point, x.data()), axis);
+  return x;
 }
 
-TEST(FragmentNetwork, ReportsAndChangesNoBitsUntilWhatItForesawComesOff) {
-  const ReportedRun with = run_reported(kFile, 1), two_threads = run_reported(kFile, 2),
-                    without = run_reported("off", 1);
-  EXPECT_GT(with.candidates, 0);
-  EXPECT_LE(with.points, with.candidates);
-  EXPECT_EQ(with.chances.size(), static_cast<std::size_t>(with.candidates));
-  for (const float p : with.chances) EXPECT_TRUE(p >= 0 && p <= 1) << p;
-  EXPECT_EQ(with.chances, two_threads.chances);
-  EXPECT_EQ(with.checksums, two_threads.checksums);
-  EXPECT_EQ(with.flown.front(), 0);
-  for (std::size_t i = 0; i < with.checksums.size(); ++i) {
-    if (with.flown[i] == 0) {
-      EXPECT_EQ(with.checksums[i], without.checksums[i]) << i;
-    }
+TEST(FragmentFeatures, AreTheSameAlongEachAxis) {
+  const std::vector<float> x = features_along(0);
+  EXPECT_GT(x[parting::kExcess], 0.5);
+  EXPECT_GT(x[parting::kAlong], x[parting::kAlong + 1]) << "the more strained first";
+  EXPECT_NEAR(x[parting::kAligned], 1, 1e-3);
+  EXPECT_NEAR(x[parting::kLimit], 0.3, 1e-6);
+  EXPECT_EQ(x[parting::kTearLength], 1.5);
+  for (const int axis : {1, 2}) {
+    const std::vector<float> other = features_along(axis);
+    for (int i = 0; i < kPartingFeatureCount; ++i) EXPECT_NEAR(x[i], other[i], 2e-4) << i;
   }
-  EXPECT_EQ(without.candidates, 0);
-  EXPECT_TRUE(without.chances.empty());
 }
 
 TEST(FragmentNetwork, IsRefusedWhereItCannotBe) {

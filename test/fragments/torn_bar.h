@@ -1,7 +1,6 @@
 // A bar that its own motion tears, for tests of what the fragment network does.
 #pragma once
 
-#include <cmath>
 #include <string>
 
 #include "mpm/mpm_state.h"
@@ -9,7 +8,7 @@
 
 namespace tissue_sim {
 
-/// A bar that its own motion tears, off its middle.
+/// A bar that its own motion tears.
 inline Scene torn_bar(const std::string& network) {
   Scene scene = free_box(Vec3(0.020, 0.008, 0.008), 0.002);
   Material m;
@@ -25,12 +24,11 @@ inline Scene torn_bar(const std::string& network) {
   return scene;
 }
 
-inline void set_going(MpmState& s) {
+/// Its ends move apart.
+inline void pull_apart(MpmState& s) {
   for (const LatticeBody& b : s.bodies) {
     b.for_each_node([&](int node, int i, int j, int k) {
-      const Vec3 x = b.node_position(i, j, k);
-      s.nodes.v[0][node] = static_cast<float>(1.5 * std::tanh((x.x() - 0.014) / 0.003));
-      s.nodes.v[1][node] = static_cast<float>(20 * (x.x() - 0.007));
+      s.nodes.v[0][node] = static_cast<float>(120 * (b.node_position(i, j, k).x() - 0.010));
     });
   }
 }

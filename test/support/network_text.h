@@ -9,12 +9,13 @@
 
 namespace tissue_sim {
 
-/// The k-th number of the file is ((7919 k) mod 1000 - 500) / 5000. Version 2 takes all features.
-inline std::string network_text(int version = 1) {
-  const int inputs = version == 1 ? kFeatureCount : kAllFeatureCount, hidden = hidden_count(inputs);
-  std::string text = "version: " + std::to_string(version) +
-                     "\nhorizon: 0.0083333333\nchecksum: " +  // NumPy's, of the same
-                     (version == 1 ? "8eece9c969fa1ab1" : "f4b25d4f627fae7d") + "\n";
+/// The k-th number of the file is ((7919 k) mod 1000 - 500) / 5000.
+inline std::string network_text() {
+  std::string text =
+      "version: 3\nhorizon: 0.0083333333\nchecksum: 752283bd9b2867c7\n"  // NumPy's, of the same
+      "classifier:\n  shape: [" +
+      std::to_string(kPartingFeatureCount) + ", " + std::to_string(kHiddenCount) + ", " +
+      std::to_string(kOutputs) + "]\n";
   std::int64_t k = 0;
   const auto numbers = [&](const char* name, int count) {
     text += std::string("  ") + name + ": [\n    ";
@@ -26,16 +27,10 @@ inline std::string network_text(int version = 1) {
     }
     text += "]\n";
   };
-  const auto network = [&](const char* name, int outputs) {
-    text += std::string(name) + ":\n  shape: [" + std::to_string(inputs) + ", " +
-            std::to_string(hidden) + ", " + std::to_string(outputs) + "]\n";
-    numbers("hidden_weights", hidden * inputs);
-    numbers("hidden_biases", hidden);
-    numbers("output_weights", outputs * hidden);
-    numbers("output_biases", outputs);
-  };
-  network("classifier", kClassifierOutputs);
-  network("modifier", kModifierOutputs);
+  numbers("hidden_weights", kHiddenCount * kPartingFeatureCount);
+  numbers("hidden_biases", kHiddenCount);
+  numbers("output_weights", kOutputs * kHiddenCount);
+  numbers("output_biases", kOutputs);
   return text;
 }
 

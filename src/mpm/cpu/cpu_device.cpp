@@ -116,7 +116,6 @@ void CpuMpmDevice::restore_motion(bool missed) {
   motion_of(s) = saved_.motion;
   index_inertia(s);
   s.faces = saved_.faces;
-  index_flights(s);
   if (!missed) return;
   again_ = true;
   // From where blocks went, whose motion still stands, and from where they began.
@@ -147,7 +146,7 @@ int CpuMpmDevice::run_part(const FramePart& part) {
     run_.work += frame.colliders.power(s.colliders.data(), loads.data()) * acted;
     if (checks == 0 || done + 1 != tear_check_at(check, checks, substeps.count)) continue;
     ++check;
-    frame.tearing = tearing_of(s, find_stretched(s, tear_share(s)));
+    frame.tearing = tearing_of(s, s, find_stretched(s, tear_share(s, s)));
   }
   if (edges) edges->end();
   return done;
@@ -176,11 +175,8 @@ void CpuMpmDevice::sweep(const std::vector<BladePath>& paths, bool moves,
 
 std::vector<int> CpuMpmDevice::label_pieces() { return update_pieces(state_, run_.pieces); }
 
-bool CpuMpmDevice::fly(double duration, Foresight& foresight,
-                       std::vector<StrainedPoint>& strained) {
-  const bool moved = !let_fly(state_, run_.pieces, run_.result, duration, foresight).empty();
-  strained = find_strained(state_, kRegionLevels[0]);
-  return moved;
+std::vector<StrainedPoint> CpuMpmDevice::strained() {
+  return find_strained(state_, kRegionLevels[0]);
 }
 
 void CpuMpmDevice::save(ArchiveWriter& archive) { archive.part("faces", state_.faces); }

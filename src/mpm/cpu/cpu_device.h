@@ -24,7 +24,7 @@ class CpuMpmDevice final : public MpmDevice {
              std::vector<std::int32_t>& touched, CutReport& report) override;
   std::vector<int> label_pieces() override;
   bool labels_by_bonds_alone() const override { return true; }
-  bool fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) override;
+  std::vector<StrainedPoint> strained() override;
   void place_boundary() override;
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
   void save(ArchiveWriter& archive) override;

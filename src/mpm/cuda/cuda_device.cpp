@@ -167,7 +167,8 @@ int CudaTissue::run_part(const FramePart& part) {
     }
     run_substeps(d, done, end);
     done = end;
-    if (tears) tearing = tearing_of(d.state, list_stretched(d, tear_share(d.state)));
+    if (tears)
+      tearing = tearing_of(d.state, d.state, list_stretched(d, tear_share(d.state, d.state)));
   }
   if (edges) edges->end();
   d.loads_of = done;

@@ -8,7 +8,6 @@
 #include "math/lanczos.h"
 #include "mpm/cuda/cuda_linearised_motion.h"
 #include "mpm/cuda/on_device.h"
-#include "mpm/fragment_flight.h"
 #include "mpm/fragment_forecast.h"
 #include "mpm/linearised_motion.h"
 #include "mpm/state_figures.h"
@@ -108,8 +107,7 @@ void finish_measure(CudaTissue& d) {
 
 // Points of tissue on a GPU that are stretched: they tear, or the fragment network looks at them.
 // They are listed there; nodes come down where there are any, and what is said of them is said by
-// the host. Pieces that fly take their shape at the end of each frame: substeps run without the
-// host.
+// the host.
 
 std::vector<StretchedPoint> list_stretched(CudaTissue& d, float share) {
   d.stretched_count.resize(1);
@@ -136,23 +134,11 @@ std::vector<StretchedPoint> list_stretched(CudaTissue& d, float share) {
   return stretched;
 }
 
-bool CudaTissue::fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) {
-  CudaTissue& d = *this;
-  MpmState& s = d.state;
-  strained = strained_of(s, list_stretched(d, kRegionLevels[0]), kRegionLevels[0]);
-  const bool flights = may_fly(d.result, foresight);
-  if (!strained.empty() || !s.flights.empty() || flights) pull_nodes(d);
-  if (flights) pull_contacts(d);
-  std::vector<std::int32_t> moved = fly_frame(s, duration, d.result.substeps);
-  const std::vector<int> fly = let_fly(s, d.pieces, d.result, duration, foresight);
-  for (const FragmentFlight& f : s.flights) {
-    if (std::find(fly.begin(), fly.end(), f.piece) == fly.end()) continue;
-    moved.insert(moved.end(), f.nodes.begin(), f.nodes.end());
-  }
-  if (moved.empty()) return false;
-  push_some(d, moved);
-  search_anew(d);
-  return true;
+std::vector<StrainedPoint> CudaTissue::strained() {
+  std::vector<StrainedPoint> strained =
+      strained_of(state, list_stretched(*this, kRegionLevels[0]), kRegionLevels[0]);
+  if (!strained.empty()) pull_nodes(*this);
+  return strained;
 }
 
 }  // namespace tissue_sim

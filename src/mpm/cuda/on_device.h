@@ -76,7 +76,7 @@ struct CudaTissue final : MpmDevice, DistantNodes {
   void place_boundary() override;
   GpuSurface place_boundary_on_gpu() override;
   void push_boundary_on_gpu(const float* impulses) override;
-  bool fly(double duration, Foresight& foresight, std::vector<StrainedPoint>& strained) override;
+  std::vector<StrainedPoint> strained() override;
   int read_points(const PointSelection& selection, std::vector<std::uint8_t>& cloud) override;
   GpuPoints read_points_on_gpu(const PointSelection& selection) override;
   void save(ArchiveWriter& archive) override;

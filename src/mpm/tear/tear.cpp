@@ -58,7 +58,7 @@ bool being_relieved(const BlockTissue& tissue, const TearRecords& records, std::
 bool comes_off(const LatticeTissue& tissue, const TearingPoint& t) {
   constexpr float kDrawnOut = 3;  // stretch
   if (t.excess < 1 || __builtin_popcount(tissue.points.bonds[t.point]) != 2) return false;
-  return 1 + t.excess * (tear_limit(tissue, t.point) - 1) > kDrawnOut;
+  return t.stretch > kDrawnOut;
 }
 
 /// Regions of tissue past its limit: for each entry the lowest of those that bonds join it to.
@@ -160,8 +160,8 @@ static float tear_share(const Material& m, double cell_size) {
              : 1.0f;
 }
 
-float tear_share(const LatticeTissue& tissue) {
-  float share = 1;
+float tear_share(const LatticeTissue& tissue, const TearRecords& records) {
+  float share = records.expected.empty() ? 1.0f : kWhereExpected;
   for (const LatticeBody& b : tissue.bodies) {
     for (const Material& m : b.materials) share = std::min(share, tear_share(m, b.cell_size));
   }
@@ -214,7 +214,7 @@ std::vector<StretchedPoint> find_stretched(BlockTissue& tissue, double share) {
   return stretched;
 }
 
-std::vector<TearingPoint> tearing_of(const LatticeTissue& tissue,
+std::vector<TearingPoint> tearing_of(const LatticeTissue& tissue, const TearRecords& records,
                                      const std::vector<StretchedPoint>& stretched) {
   std::vector<TearingPoint> tearing;
   for (const StretchedPoint& p : stretched) {
@@ -224,7 +224,10 @@ std::vector<TearingPoint> tearing_of(const LatticeTissue& tissue,
     const Material& material = body.material_of(tissue.points, p.point);
     const float limit = least_tear_limit(material);
     if (limit == 0) continue;
-    const float least = 1 + tear_share(material, body.cell_size) * (limit - 1);
+    const bool expected =
+        std::binary_search(records.expected.begin(), records.expected.end(), p.point);
+    const float begins = expected ? kWhereExpected : 1.0f;
+    const float least = 1 + std::min(begins, tear_share(material, body.cell_size)) * (limit - 1);
     Eigen::Matrix3d C;
     C << p.C[0], p.C[3], p.C[4], p.C[3], p.C[1], p.C[5], p.C[4], p.C[5], p.C[2];
     if (!C.allFinite()) continue;  // the frame's end will find out
@@ -232,13 +235,14 @@ std::vector<TearingPoint> tearing_of(const LatticeTissue& tissue,
     solver.computeDirect(C);
     const double stretch = std::sqrt(solver.eigenvalues()[2]);
     if (stretch < least) continue;  // it was looked for by the limit of a weaker material
-    const double excess = (stretch - 1) / (tear_limit(tissue, p.point) - 1);
+    const double excess = (stretch - 1) / (tear_limit(tissue, p.point) - 1) / begins;
     Vec3 normal = solver.eigenvectors().col(2);
     if (tissue.points.anchored[p.point] == Points::kAtAnchor) {
       const Points::Site& s = tissue.points.site[p.point];
       normal = face_normal(body.body.anchors, body.site_position(s.x, s.y, s.z));
     }
-    tearing.push_back({p.point, static_cast<float>(excess), normal, stretch >= limit});
+    tearing.push_back({p.point, static_cast<float>(excess), static_cast<float>(stretch), normal,
+                       stretch >= limit});
   }
   const auto is_past = [](const TearingPoint& t) { return t.past; };
   if (std::none_of(tearing.begin(), tearing.end(), is_past)) tearing.clear();

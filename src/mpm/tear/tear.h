@@ -46,7 +46,8 @@ struct TearRecords {
   std::vector<double> tore_at;  ///< per body: when a bond last tore [s]; empty while none did
   std::vector<std::int32_t> bridge_ends;  ///< points, by number
   std::set<std::int32_t> debris;          ///< the lowest point of each: mpm/tear/debris.h
-  TISSUE_SIM_FIELDS(tore_at, bridge_ends, debris)
+  std::vector<std::int32_t> expected;     ///< points that a network expects to part, by number
+  TISSUE_SIM_FIELDS(tore_at, bridge_ends, debris, expected)
 };
 
 /// Whether a body of the scene can tear.
@@ -70,25 +71,29 @@ float least_tear_limit(const Material& material);
 float least_tear_limit(const LatticeBody& body);
 
 /// A point past the least limit of its material, or past kAtFronts of that where a tip is looked
-/// at.
+/// at, or kWhereExpected.
 struct TearingPoint {
   std::int32_t point;
-  float excess;  ///< strain over that of the limit, (stretch - 1) / (limit - 1)
-  Vec3 normal;   ///< principal direction of the largest stretch, in reference space
-  bool past;     ///< the least limit of its material
+  float excess;   ///< strain over that from which on cracks begin there
+  float stretch;  ///< the largest
+  Vec3 normal;    ///< principal direction of the largest stretch, in reference space
+  bool past;      ///< the least limit of its material
 };
 
 /// How much of its limit's strain a point at a front has at least whose tip is past the limit.
 inline constexpr float kAtFronts = 0.2f;
+/// While tissue is past its limit anywhere, cracks may begin at points that are expected to part
+/// from this share of their limit's strain on: coarse cells know strain's peaks the less.
+inline constexpr float kWhereExpected = 0.7f;
 /// From what share of the limit's strain on points are listed.
-float tear_share(const LatticeTissue& tissue);
+float tear_share(const LatticeTissue& tissue, const TearRecords& records);
 
 /// Points whose strain is at least `share` of what the weakest material bears that their block may
 /// have, by number.
 std::vector<StretchedPoint> find_stretched(BlockTissue& tissue, double share);
 
-/// Those of them that tear, or are at fronts that may.
-std::vector<TearingPoint> tearing_of(const LatticeTissue& tissue,
+/// Those of them that tear, are at fronts that may, or are expected to part.
+std::vector<TearingPoint> tearing_of(const LatticeTissue& tissue, const TearRecords& records,
                                      const std::vector<StretchedPoint>& stretched);
 
 /// Breaks bonds of the points `tearing` (by number). Appends the points that lost one to `changed`,

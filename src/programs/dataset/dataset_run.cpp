@@ -2,30 +2,92 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <cstring>
+#include <iterator>
+#include <map>
 #include <random>
+#include <utility>
 
+#include "math/draw.h"
 #include "mpm/fragment_features.h"
-#include "mpm/tear/debris.h"
+#include "mpm/tear/tear.h"
 
 namespace tissue_sim {
 namespace {
 
 /// Tissue that takes so many substeps a frame, several times what stiff and whole tissue does, or
 /// is in so many pieces is crushed: nothing is learnt from it from then on.
-constexpr int kMostSubsteps = 250, kMostPieces = 40;
+constexpr int kMostSubsteps = 40, kMostPieces = 40;
 
-double loose_share(const MpmTissue& tissue, double coarse_cell) {
-  const std::vector<std::uint8_t> fragment = fragments_of(tissue, coarse_cell);
-  double all = 0, loose = 0;
-  for (const Fragment& f : tissue.pieces().all) {
-    all += f.volume;
-    if (fragment[f.id] != 0) loose += f.volume;
+/// A sample that waits for its labels.
+struct Waiting {
+  std::vector<std::int32_t> points;  ///< of one cell, one for each line of bonds that hold
+  int axis, row;
+};
+
+/// Points of one cell, one for each line along the axis on which nothing broke nearby.
+std::vector<std::int32_t> whole_lines(const MpmState& s, const FragmentCandidates& found, int group,
+                                      int axis) {
+  std::vector<std::int32_t> lines;
+  std::vector<int> seen;
+  for (std::int32_t i = found.first[group]; i < found.first[group + 1]; ++i) {
+    const std::int32_t p = found.points[i];
+    const Points::Site& site = s.points.site[p];
+    const int place[3] = {site.x & 1, site.y & 1, site.z & 1};
+    const int line = 2 * place[(axis + 1) % 3] + place[(axis + 2) % 3];
+    if (std::find(seen.begin(), seen.end(), line) != seen.end()) continue;
+    seen.push_back(line);
+    if (!broken_on_line(s, s.bodies[site.body], p, kForwardBond + axis)) lines.push_back(p);
   }
-  return loose / all;
+  return lines;
 }
 
-/// The fine points within each coarse one, by reference place.
+/// Calls f(line, broken) for each point of a run within the cell of coarse points and a point to
+/// either side along the axis: its line along the axis, and whether bonds of that are broken there.
+template <class F>
+void for_each_line(const MpmState& coarse, const std::vector<std::vector<std::int32_t>>& within,
+                   const MpmState& run, const Waiting& w, const F& f) {
+  const int up = kForwardBond + w.axis, down = opposite_bond(up);
+  for (const std::int32_t p : w.points) {
+    const Points::Site& s = coarse.points.site[p];
+    const int along[3] = {s.x, s.y, s.z};
+    const int first = -1 - (along[w.axis] & 1);  // of the four, from this one on
+    for (int step = first; step < first + 4; ++step) {
+      const std::int32_t q = neighbour(coarse.bodies[s.body], s, up, step);
+      if (q < 0) continue;
+      for (const std::int32_t own : within[q]) {
+        const Points::Site& site = run.points.site[own];
+        const int place[3] = {site.x, site.y, site.z};
+        f(std::make_pair(place[(w.axis + 1) % 3], place[(w.axis + 2) % 3]),
+          (broken_bonds(run, own) & (1u << up | 1u << down)) != 0);
+      }
+    }
+  }
+}
+
+bool is_torn(const MpmState& coarse, const std::vector<std::vector<std::int32_t>>& within,
+             const MpmState& run, const Waiting& w) {
+  std::map<std::pair<int, int>, bool> lines;
+  for_each_line(coarse, within, run, w, [&](const std::pair<int, int>& line, bool broken) {
+    bool& torn = lines[line];
+    torn = torn || broken;
+  });
+  const auto torn =
+      std::count_if(lines.begin(), lines.end(), [](const auto& l) { return l.second; });
+  return torn > 0 && 2 * torn >= static_cast<std::ptrdiff_t>(lines.size());
+}
+
+/// Features as half as many digits tell them: packed they take a third less room.
+float rounded(float x) {
+  std::uint32_t bits;
+  std::memcpy(&bits, &x, sizeof bits);
+  bits = (bits + 0x800u) & ~0xfffu;
+  std::memcpy(&x, &bits, sizeof bits);
+  return x;
+}
+
+}  // namespace
+
 std::vector<std::vector<std::int32_t>> children(const MpmState& coarse, const MpmState& fine) {
   std::vector<std::vector<std::int32_t>> of(coarse.points.size());
   for (std::int32_t p = 0; p < fine.points.size(); ++p) {
@@ -39,14 +101,6 @@ std::vector<std::vector<std::int32_t>> children(const MpmState& coarse, const Mp
   }
   return of;
 }
-
-/// A sample that waits for its label.
-struct Waiting {
-  std::vector<std::int32_t> points;  ///< of one cell
-  int row;                           ///< in the samples
-};
-
-}  // namespace
 
 bool advance_frame(MpmTissue& tissue, const DatasetScene& scene, int frame, FrameResult* result) {
   FrameInput input;
@@ -84,101 +138,62 @@ std::vector<std::uint8_t> fragments_of(const MpmTissue& tissue, double coarse_ce
   return fragment;
 }
 
+double jittered(const DatasetScene& scene, int level, int truth) {
+  const double u = static_cast<double>(split_mix(scene.seed) >> 11) * 0x1p-53 + 0.618034 * truth;
+  return level * (0.95 + 0.1 * (u - std::floor(u)));
+}
+
 DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions& options) {
   DatasetSamples samples;
-  const double h = scene.scene.cell_size;
   std::mt19937_64 random(scene.seed);
   const auto coarse = begin_run(scene, 1);
+  MpmState& s = coarse->state();
+  std::vector<std::vector<std::int32_t>> itself(s.points.size());
+  for (std::int32_t p = 0; p < s.points.size(); ++p) itself[p] = {p};
   std::vector<std::vector<Waiting>> of_frame(options.frames + 1);  // by when their label is known
-  int frames = 0;
-  for (int frame = 0; frame < options.frames; ++frame, ++frames) {
-    MpmState& s = coarse->state();
+  const std::size_t columns = 1 + options.truths;
+  int rows = 0;
+  for (int frame = 0; frame < options.frames; ++frame) {
     if (frame > 0 && frame + options.horizon <= options.frames) {
       std::vector<StrainedPoint> strained = find_strained(s, kRegionLevels[0]);
       const FragmentCandidates found = fragment_candidates(s, coarse->pieces(), strained);
       const FragmentSurroundings around =
           fragment_surroundings(s, coarse->pieces(), std::move(strained));
       std::vector<int> groups(found.groups());
-      std::iota(groups.begin(), groups.end(), 0);
-      for (std::size_t i = 0; i < groups.size(); ++i) {  // the first are drawn evenly from all
-        if (static_cast<int>(i) == options.per_frame) break;
+      for (int g = 0; g < found.groups(); ++g) groups[g] = g;
+      int taken = 0;
+      for (std::size_t i = 0; i < groups.size() && taken < options.per_frame; ++i) {
         std::swap(groups[i], groups[i + random() % (groups.size() - i)]);
+        float x[kPartingFeatureCount];
+        const int axis =
+            parting_features(s, coarse->pieces(), around, found.points[found.first[groups[i]]], x);
+        std::vector<std::int32_t> lines = whole_lines(s, found, groups[i], axis);
+        if (lines.empty()) continue;
+        std::transform(x, x + kPartingFeatureCount, std::back_inserter(samples.x), rounded);
+        of_frame[frame + options.horizon].push_back({std::move(lines), axis, rows++});
+        ++taken;
       }
-      groups.resize(std::min<std::size_t>(groups.size(), options.per_frame));
-      std::sort(groups.begin(), groups.end());
-      for (const int g : groups) {
-        const int row = static_cast<int>(samples.x.size()) / kAllFeatureCount;
-        samples.x.resize(samples.x.size() + kAllFeatureCount);
-        float* x = &samples.x[static_cast<std::size_t>(row) * kAllFeatureCount];
-        const std::int32_t point = found.points[found.first[g]];
-        fragment_features(s, point, x);
-        surrounding_features(s, coarse->pieces(), around, point, x);
-        const auto limit = static_cast<float>(scene.scene.materials[0].tear_stretch);
-        samples.about.insert(samples.about.end(),
-                             {static_cast<float>(frame), limit, static_cast<float>(h)});
-        of_frame[frame + options.horizon].push_back(
-            {{found.points.begin() + found.first[g], found.points.begin() + found.first[g + 1]},
-             row});
-      }
-      samples.plain.resize(samples.x.size() / kAllFeatureCount, 0);
     }
-    if (!advance_frame(*coarse, scene, frame)) {
-      samples.blew_up = true;
-      break;
-    }
-    const std::vector<std::uint8_t> fragment = fragments_of(*coarse, h);
-    for (const Waiting& w : of_frame[frame + 1]) {
-      std::size_t loose = 0;
-      for (const std::int32_t p : w.points) loose += fragment[coarse->fragment_of(p)];
-      samples.plain[w.row] = 2 * loose >= w.points.size();
-    }
-  }
-  samples.coarse_loose = loose_share(*coarse, h);
-  samples.coarse_points = coarse->point_count();
-
-  const auto fine = begin_run(scene, options.level);
-  samples.true_points = fine->point_count();
-  const auto within = children(coarse->state(), fine->state());
-  const std::size_t rows = samples.x.size() / kAllFeatureCount;
-  samples.q.resize(rows, 0);
-  samples.df.resize(9 * rows, 0);
-  std::size_t known = 0;  // rows come in order of time
-  for (int frame = 0; frame < frames; ++frame) {
-    if (!advance_frame(*fine, scene, frame)) {
-      samples.blew_up = true;
-      break;
-    }
+    if (!advance_frame(*coarse, scene, frame)) break;
     ++samples.frames;
-    const MpmState& s = fine->state();
-    const std::vector<std::uint8_t> fragment = fragments_of(*fine, h);
-    for (const Waiting& w : of_frame[frame + 1]) {
-      double volume = 0, loose = 0;
-      Eigen::Matrix3d F = Eigen::Matrix3d::Zero();
-      for (const std::int32_t coarse_point : w.points) {
-        for (const std::int32_t p : within[coarse_point]) {
-          const Points::Site& site = s.points.site[p];
-          const double own = s.points.volume[p];
-          volume += own;
-          if (fragment[fine->fragment_of(p)] != 0) loose += own;
-          F += own * deformation_gradient(s.bodies[site.body], site, *s.fields, s.nodes);
-        }
+    samples.torn.resize(static_cast<std::size_t>(rows) * columns, kUnknown);
+    for (const Waiting& w : of_frame[frame + 1])
+      samples.torn[w.row * columns] = is_torn(s, itself, s, w);
+  }
+  samples.torn.resize(static_cast<std::size_t>(rows) * columns, kUnknown);
+  for (int truth = 0; truth < options.truths; ++truth) {
+    const auto fine = begin_run(scene, jittered(scene, options.level, truth));
+    const auto within = children(s, fine->state());
+    for (int frame = 0; frame < samples.frames; ++frame) {
+      if (!advance_frame(*fine, scene, frame)) {
+        ++samples.crushed;
+        break;
       }
-      if (volume == 0) continue;
-      samples.q[w.row] = loose >= 0.5 * volume;
-      for (int i = 0; i < 9; ++i) {
-        samples.df[9 * w.row + i] =
-            static_cast<float>(F(i / 3, i % 3) / volume) -
-            samples.x[static_cast<std::size_t>(w.row) * kAllFeatureCount + i];
+      for (const Waiting& w : of_frame[frame + 1]) {
+        samples.torn[w.row * columns + 1 + truth] = is_torn(s, within, fine->state(), w);
       }
-      known = std::max(known, static_cast<std::size_t>(w.row) + 1);
     }
   }
-  samples.true_loose = loose_share(*fine, h);
-  samples.x.resize(known * kAllFeatureCount);
-  samples.q.resize(known);
-  samples.plain.resize(known);
-  samples.df.resize(9 * known);
-  samples.about.resize(3 * known);
   return samples;
 }
 

@@ -15,22 +15,22 @@ struct DatasetOptions {
   int frames = 40;      ///< of each run
   int horizon = 8;      ///< frames ahead that labels are for
   int per_frame = 100;  ///< samples of a frame at most
-  int level = 3;        ///< how many times finer the truth is
+  int level = 3;        ///< how many times finer truths are
+  int truths = 1;       ///< how many: see jittered()
 };
 
-/// Samples of one scene, in order of time: groups of points (FragmentCandidates).
+/// Samples of one scene, in order of time: cells of the coarse run (FragmentCandidates) across
+/// which bonds hold along the axis nearest to their largest stretch. A sample is torn where most of
+/// the material's lines along that axis through the cell and half of either neighbour are.
 struct DatasetSamples {
-  std::vector<float> x;  ///< [n, 101]: fragments/features.h
-  std::vector<std::uint8_t>
-      q;                  ///< [n]: most of it is part of a fragment `horizon` later, in the truth
-  std::vector<float> df;  ///< [n, 9]: F then, in the truth, less that of the cell now
-  std::vector<std::uint8_t> plain;  ///< [n]: part of a fragment then, in the coarse run itself
-  std::vector<float> about;         ///< [n, 3]: frame, tear_stretch, cell size [m]
-  double coarse_loose = 0, true_loose = 0;  ///< share of the volume that came loose
-  int coarse_points = 0, true_points = 0;
-  int frames = 0;        ///< of the truth
-  bool blew_up = false;  ///< one of the runs, which ended there
+  std::vector<float> x;  ///< [n, kPartingFeatureCount]: fragments/features.h
+  /// [n, 1 + truths]: torn `horizon` later (0 or 1) in the coarse run itself, and in each truth;
+  /// kUnknown where the truth was crushed before.
+  std::vector<std::uint8_t> torn;
+  int frames = 0;   ///< of the coarse run
+  int crushed = 0;  ///< truths that were
 };
+inline constexpr std::uint8_t kUnknown = 255;
 
 /// A tissue of the scene, `level` times finer, that was set going.
 std::unique_ptr<MpmTissue> begin_run(const DatasetScene& scene, double level);
@@ -44,7 +44,11 @@ bool advance_frame(MpmTissue& tissue, const DatasetScene& scene, int frame,
 /// Returns which pieces are, by id.
 std::vector<std::uint8_t> fragments_of(const MpmTissue& tissue, double coarse_cell);
 
-/// Runs the scene twice. What the coarse run shows is labelled by what the truth comes to.
+/// How many times finer truth number `truth` of a scene is: within 5 % of `level`, so that its
+/// lattice lies otherwise against the tissue.
+double jittered(const DatasetScene& scene, int level, int truth);
+
+/// Runs the scene and its truths. What the coarse run shows is labelled by what they come to.
 DatasetSamples run_dataset_scene(const DatasetScene& scene, const DatasetOptions& options);
 
 }  // namespace tissue_sim

@@ -1,5 +1,6 @@
 #include "programs/dataset/dataset_scene.h"
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 #include <stdexcept>
@@ -47,7 +48,8 @@ BladePath notch(const Body& body, const Vec3& size, double x, double depth) {
 }  // namespace
 
 const std::vector<std::string>& dataset_kinds() {
-  static const std::vector<std::string> kinds = {"tension", "fall", "compression", "cut", "blow"};
+  static const std::vector<std::string> kinds = {"tension", "fall", "compression",
+                                                 "cut",     "blow", "anchored"};
   return kinds;
 }
 
@@ -126,6 +128,25 @@ DatasetScene make_dataset_scene(std::uint64_t seed, int index,
         d.cuts.push_back(notch(b, size, x, draw.even(0.3, 0.7) * size.z()));
       }
     }
+  } else if (d.kind == "anchored") {
+    // Held at one end, an eighth to a quarter of it; the rest moves away, and across.
+    const double held = draw.even(0.125, 0.25) * size[along];
+    const double rate = v / size[along], swing = draw.even(-0.5, 0.5) * rate;
+    const int across = (along + 1) % 3;
+    Anchor anchor;
+    anchor.kind = Region::Kind::kBox;
+    anchor.min = middle - size;
+    anchor.max = middle + size;
+    const double face = middle[along] - 0.5 * size[along] + held;
+    anchor.max[along] = face;
+    s.bodies[0].anchors = {anchor};
+    own = [=](const Vec3& x) {
+      const double from_face = std::max(0.0, x[along] - face);
+      Vec3 velocity = Vec3::Zero();
+      velocity[along] = rate * from_face;
+      velocity[across] = swing * from_face;
+      return velocity;
+    };
   } else if (d.kind == "fall") {
     const double down = v, sideways = draw.even(-0.5, 0.5) * down;
     own = [=](const Vec3&) { return Vec3(sideways, 0, -down); };
@@ -142,7 +163,7 @@ DatasetScene make_dataset_scene(std::uint64_t seed, int index,
     };
   } else {
     throw std::invalid_argument("there is no kind of scene '" + d.kind +
-                                "': it must be tension, fall, compression, cut or blow");
+                                "': it must be tension, fall, compression, cut, blow or anchored");
   }
   // Waves on top of it: tissue that is torn evenly comes apart in its middle, whatever the cells.
   struct Wave {

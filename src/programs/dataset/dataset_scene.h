@@ -15,7 +15,7 @@ namespace tissue_sim {
 /// what flies. Cells are those of the coarse run; the truth has finer ones and the same all else.
 struct DatasetScene {
   int index = 0;
-  std::string kind;                           ///< tension, fall, compression, cut, blow
+  std::string kind;                           ///< one of dataset_kinds()
   Scene scene;                                ///< of the coarse run
   std::function<Vec3(const Vec3&)> velocity;  ///< at first, by reference place [m/s]
   std::vector<BladePath> cuts;                ///< at first

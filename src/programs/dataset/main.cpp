@@ -1,4 +1,5 @@
 // tissue_sim_dataset: runs scenes that tear and writes what the fragment network learns from.
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -22,19 +23,18 @@ constexpr char kUsage[] =
   --scenes N       how many (60)
   --first N        number of the first (0)
   --seed N         of all that is drawn (1)
-  --kinds A,B      of tension, fall, compression, cut, blow, in turn (all)
-  --level N        how many times finer the truth is (3)
+  --kinds A,B      of tension, fall, compression, cut, blow, anchored, in turn (all)
+  --level N        how many times finer truths are (3)
   --frames N       of each run, 1/960 s each (40)
   --horizon N      frames ahead that labels are for (8)
   --per-frame N    samples of a frame at most (100)
+  --truths N       how many, 0.95 to 1.05 times that fine (1)
   --converge N     no data: runs each scene with cells 1, 2 .. N times finer, and writes how each
                    comes out into FOLDER/convergence.csv
-  --compare FILE   no data: runs each scene plain, with fragment networks, with cells half as large
-                   and as the truth, and writes how each comes out into FOLDER/comparison.csv. FILE
+  --compare FILE   no data: runs each scene plain, with the network, with cells half as large and
+                   as the truth, and writes how each comes out into FOLDER/comparison.csv. FILE
                    is the network's
   --baselines FILE of threshold and logistic regression for that
-  --paper FILE     another network to compare, of the paper's features
-  --equal N        how many times finer cells take as long as the network (1.03)
 Scenes that are in FOLDER are left alone: the same command goes on with what is missing.
 One process does one scene after another: scripts/sweep shares them out over processes and machines.
 )";
@@ -88,19 +88,14 @@ Arguments read_arguments(int argc, char** argv) {
       a.options.horizon = number(1);
     } else if (name == "--per-frame") {
       a.options.per_frame = number(1);
+    } else if (name == "--truths") {
+      a.options.truths = number(1);
     } else if (name == "--converge") {
       a.converge = number(2);
     } else if (name == "--compare") {
       a.compared.network = std::filesystem::absolute(value);
     } else if (name == "--baselines") {
       a.compared.baselines = value;
-    } else if (name == "--paper") {
-      a.compared.paper = std::filesystem::absolute(value);
-    } else if (name == "--equal") {
-      a.compared.equal = std::stod(value);
-      if (!(a.compared.equal >= 1 && a.compared.equal <= 4)) {
-        throw std::invalid_argument("--equal is " + value + ": it must be from 1 to 4");
-      }
     } else if (name == "--kinds") {
       a.kinds.clear();
       std::istringstream list(value);
@@ -124,9 +119,8 @@ std::string path_of(const Arguments& a, int index, const std::string& what) {
   return a.out + "/" + number + what;
 }
 
-/// What is known of a scene, as JSON: held-out scenes are chosen by it.
-std::string describe(const DatasetScene& d, const DatasetSamples& samples, double horizon,
-                     double seconds) {
+/// What is known of a scene, as JSON without its end: held-out scenes are chosen by it.
+std::string describe(const DatasetScene& d, const DatasetOptions& options) {
   const Scene& s = d.scene;
   const Material& m = s.materials[0];
   const char* shapes[] = {"box", "ball", "ellipsoid", "cylinder", "mesh"};
@@ -137,37 +131,26 @@ std::string describe(const DatasetScene& d, const DatasetSamples& samples, doubl
       << ", \"young_modulus\": " << m.young_modulus << ", \"poisson_ratio\": " << m.poisson_ratio
       << ", \"viscosity\": " << m.viscosity << ", \"tear_stretch\": " << m.tear_stretch
       << ", \"tear_length\": " << m.tear_length << ", \"speed\": " << d.speed
-      << ", \"horizon\": " << horizon << ", \"coarse_points\": " << samples.coarse_points
-      << ", \"true_points\": " << samples.true_points << ", \"frames\": " << samples.frames
-      << ", \"samples\": " << samples.q.size() << ", \"coarse_loose\": " << samples.coarse_loose
-      << ", \"true_loose\": " << samples.true_loose
-      << ", \"blew_up\": " << (samples.blew_up ? "true" : "false") << ", \"seconds\": " << seconds
-      << "}\n";
+      << ", \"horizon\": " << options.horizon / s.frame_rate;
   return out.str();
 }
 
 void write_scene(const Arguments& a, int index) {
-  if (std::filesystem::exists(path_of(a, index, ".json"))) return;
+  const std::string path = path_of(a, index, ".json"), unfinished = path + ".part";
+  if (std::filesystem::exists(path)) return;
   const auto begin = std::chrono::steady_clock::now();
   const DatasetScene scene = make_dataset_scene(a.seed, index, a.kinds);
   const DatasetSamples samples = run_dataset_scene(scene, a.options);
+  write_npy(path_of(a, index, "_x.npy"), samples.x, kPartingFeatureCount);
+  write_npy(path_of(a, index, "_torn.npy"), samples.torn, 1 + a.options.truths);
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - begin;
-  write_npy(path_of(a, index, "_x.npy"), samples.x, kAllFeatureCount);
-  write_npy(path_of(a, index, "_q.npy"), samples.q, 0);
-  write_npy(path_of(a, index, "_df.npy"), samples.df, 9);
-  write_npy(path_of(a, index, "_plain.npy"), samples.plain, 0);
-  write_npy(path_of(a, index, "_about.npy"), samples.about, 3);
   // Last, and whole at once: where it is, the others are.
-  const std::string text =
-      describe(scene, samples, a.options.horizon / scene.scene.frame_rate, took.count());
-  const std::string path = path_of(a, index, ".json"), unfinished = path + ".part";
-  std::ofstream(unfinished) << text;
+  std::ofstream(unfinished) << describe(scene, a.options) << ", \"crushed\": " << samples.crushed
+                            << ", \"seconds\": " << took.count() << "}\n";
   std::filesystem::rename(unfinished, path);
-  std::size_t fragments = 0;
-  for (const std::uint8_t q : samples.q) fragments += q;
-  std::printf("scene %d of %d, %s: %zu samples, %zu of fragments, %.1f s%s\n", index - a.first + 1,
-              a.scenes, scene.kind.c_str(), samples.q.size(), fragments, took.count(),
-              samples.blew_up ? " (blew up)" : "");
+  std::printf("scene %d of %d, %s: %zu samples, %d truths crushed, %.1f s\n", index - a.first + 1,
+              a.scenes, scene.kind.c_str(), samples.x.size() / kPartingFeatureCount,
+              samples.crushed, took.count());
   std::fflush(stdout);
 }
 

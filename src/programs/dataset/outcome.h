@@ -11,28 +11,28 @@ namespace tissue_sim {
 
 /// What a run is done by.
 struct RunKind {
-  std::string name;               ///< plain, stretch, logistic, paper, network, equal, finer, truth
-  double level = 1;               ///< how many times finer its cells are
-  std::string network;            ///< file of the fragment network, empty for none
-  FragmentClassifier classifier;  ///< in the place of the network's, if any
+  std::string name;     ///< plain, stretch, logistic, network, finer, truth, truth2, truth3
+  double level = 1;     ///< how many times finer its cells are
+  std::string network;  ///< file of the fragment network, empty for none
+  PartingClassifier classifier;  ///< in the place of the network's, if any
 };
 
 /// What the ways that are compared with the truth are made of.
 struct ComparedRuns {
-  std::string network, paper;  ///< files of networks; `paper`, one of the paper's features, if any
-  std::string baselines;       ///< what scripts/train_fragments --baselines wrote
-  double equal = 1.03;         ///< how many times finer cells take no longer than the network does
-  int level = 3;               ///< of the truth
+  std::string network;    ///< its file
+  std::string baselines;  ///< what scripts/train_fragments --baselines wrote
+  int level = 3;          ///< of the truth
 };
 
-/// The plain coarse run; with the modifier of the network and, as the classifier, a threshold on
-/// the largest principal stretch, logistic regression, and its own; the same of the paper's; finer
-/// cells that take as long as the network, and half as large ones; the truth. Throws
+/// The plain coarse run; with a threshold on the largest principal stretch as the classifier,
+/// logistic regression, and the network; cells half as large; three truths whose lattices lie
+/// otherwise against the tissue. Throws
 /// std::invalid_argument for a file that is not what it must be.
 std::vector<RunKind> compared_runs(const ComparedRuns& of);
 
 struct Outcome {
-  int points = 0, flown = 0;
+  int points = 0;
+  int expected = 0;           ///< points to part, summed over frames
   std::vector<double> sizes;  ///< of the fragments at the end, as shares of all, largest first
   double first_time = -1;     ///< when the first came off [s]
   double peak_speed = 0;      ///< of a fragment's centre, ever [m/s]
@@ -45,7 +45,7 @@ struct Outcome {
   std::vector<float> cloud;   ///< [points, 4] at the end: place [m], and which fragment, 0 none
 };
 
-/// Drifts are 0 where there is ground, which takes momentum up.
+/// Drifts are 0 where ground or anchors take momentum up.
 Outcome run_outcome(const DatasetScene& scene, const RunKind& kind, int frames);
 
 /// The columns of a table of outcomes, and a line of it.

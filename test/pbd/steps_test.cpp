@@ -56,7 +56,8 @@ TEST(PbdSteps, AreAsManyAsABallsForceNeeds) {
 /// Its rim lies at no vertex: triangles feel it.
 TEST(PbdSteps, AreAsManyAsAPunchsForceNeeds) {
   for (const double cell_size : {0.003, 0.0025}) {
-    EXPECT_TRUE(is_within("a flat punch's, 3 mm deep, 3, 2.5 mm", punch_error(cell_size), 0.05))
+    EXPECT_TRUE(
+        is_within("a flat punch's force, 3 mm deep, 3, 2.5 mm", punch_error(cell_size), 0.05))
         << cell_size;
   }
 }

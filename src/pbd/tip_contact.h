@@ -181,7 +181,7 @@ TISSUE_SIM_INLINE void find_at_axis(const Collider& tip, const double (&x)[3][3]
     up[a] = -static_cast<double>(tip.rotation[3 * a + 2]);
     axis[a] = end[a] + static_cast<double>(tip.radius) * up[a];
   }
-  const double least = tip.radius, most = fmax(tip.radius, tip.length);
+  const double least = tip.radius, most = fmaxf(tip.radius, tip.length);
   for (int turn = 0; turn < 8; ++turn) {
     on_triangle(axis, x[0], x[1], x[2], place);
     for (int a = 0; a < 3; ++a) way[a] = place[a] - end[a];

@@ -1,6 +1,6 @@
 // Contact with the ground and with tools: a constraint for each vertex that lies in one, and for
-// the place of each triangle that lies deepest in a tip, which passes between vertices that are
-// drawn apart; inelastic, with Coulomb friction. What acts on the tool is what its multipliers say.
+// the place of each triangle that lies deepest in a tip or at a rim, which pass between vertices;
+// inelastic, with Coulomb friction. What acts on the tool is what its multipliers say.
 #include "pbd/contact.h"
 
 #include <algorithm>
@@ -14,14 +14,17 @@ namespace {
 
 constexpr int kContactsOfPart = 1024;
 
-Corner corner_of(const Vertices& v, int i) {
-  Corner c;
+/// Where it is, which is all that is asked of most.
+void put_place(const Vertices& v, int i, Corner& c) {
   const std::size_t at = 4 * static_cast<std::size_t>(i);
   std::copy_n(&v.x[at], 4, c.x);
   std::copy_n(&v.moved[at], 3, c.moved);
+}
+
+void put_motion(const Vertices& v, int i, Corner& c) {
+  const std::size_t at = 4 * static_cast<std::size_t>(i);
   std::copy_n(&v.predicted[at], 3, c.predicted);
   std::copy_n(&v.v[at], 3, c.v);
-  return c;
 }
 
 struct Contacts {
@@ -76,10 +79,11 @@ bool push_triangle(State& s, const AtTip& t, float h, ColliderLoad& load) {
   Vertices& v = s.vertices;
   const Collider& tip = s.colliders[t.collider];
   Corner corner[3];
-  for (int k = 0; k < 3; ++k) corner[k] = corner_of(v, t.corner[k]);
+  for (int k = 0; k < 3; ++k) put_place(v, t.corner[k], corner[k]);
   TipPlace found;
   ContactPush push;
   if (!find_in_tip(tip, corner, s.mean_edge, found)) return false;
+  for (int k = 0; k < 3; ++k) put_motion(v, t.corner[k], corner[k]);
   if (!push_out_of_tip(tip, found, h, corner, push)) return false;
   for (int k = 0; k < 3; ++k) {
     std::copy_n(corner[k].moved, 3, &v.moved[4 * static_cast<std::size_t>(t.corner[k])]);
@@ -105,6 +109,8 @@ std::vector<TipSweep> sweeps_of_tips(const std::vector<Collider>& begin,
       sweeps.back().low[a] = std::min(from.min[a], to.min[a]);
       sweeps.back().high[a] = std::max(from.max[a], to.max[a]);
     }
+    sweeps.back().begin = begin[c];
+    sweeps.back().end = end[c];
     sweeps.back().collider = static_cast<std::int32_t>(c);
   }
   return sweeps;
@@ -121,7 +127,10 @@ void find_at_tips(State& s, const std::vector<TipSweep>& tips, double duration) 
       const int end = std::min(triangles, (part + 1) * kTrianglesOfPart);
       for (int i = part * kTrianglesOfPart; i < end; ++i) {
         Corner corner[3];
-        for (int k = 0; k < 3; ++k) corner[k] = corner_of(s.vertices, s.triangles[i][k]);
+        for (int k = 0; k < 3; ++k) {
+          put_place(s.vertices, s.triangles[i][k], corner[k]);
+          put_motion(s.vertices, s.triangles[i][k], corner[k]);
+        }
         if (!may_meet(tip, corner, s.mean_edge, duration)) continue;
         found[part].push_back({s.triangles[i], tip.collider});
       }

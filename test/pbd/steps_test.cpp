@@ -20,7 +20,19 @@ Scene of_tetrahedra(Scene scene, int steps) {
   return scene;
 }
 
-/// Of a ball's force, 6 mm deep in a cylinder 24 mm high.
+/// Of a flat punch's force, 3 mm deep in a cylinder 24 mm high.
+double punch_error(double cell_size) {
+  Tool punch;
+  punch.type = ToolType::kPunch;
+  punch.radius = 0.006;
+  punch.edge_radius = 0.001;
+  punch.length = 0.05;
+  punch.friction = 0;
+  Simulation simulation(of_tetrahedra(indented_cylinder(cell_size, 0, punch), 0));
+  return indentation_force(simulation, 0.003) / reference(kData, "punch", "force_3mm") - 1;
+}
+
+/// Of a ball's force, 6 mm deep.
 double force_error(double cell_size, int steps, std::string* note = nullptr) {
   Tool ball;
   ball.type = ToolType::kBall;
@@ -37,6 +49,15 @@ TEST(PbdSteps, AreAsManyAsABallsForceNeeds) {
   for (const double cell_size : {0.004, 0.0025}) {
     EXPECT_TRUE(is_within("a ball's force, steps by themselves, 4, 2.5 mm",
                           force_error(cell_size, 0), 0.05))
+        << cell_size;
+  }
+}
+
+/// Its rim lies at no vertex: triangles feel it.
+TEST(PbdSteps, AreAsManyAsAPunchsForceNeeds) {
+  for (const double cell_size : {0.003, 0.0025}) {
+    EXPECT_TRUE(
+        is_within("a flat punch's force, 3 mm deep, 3, 2.5 mm", punch_error(cell_size), 0.05))
         << cell_size;
   }
 }

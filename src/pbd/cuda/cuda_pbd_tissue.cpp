@@ -1,7 +1,5 @@
 #include "pbd/cuda/cuda_pbd_tissue.h"
 
-#include <algorithm>
-
 #include "pbd/cuda/on_device.h"
 #include "pbd/find_touches.h"
 #include "pbd/model.h"
@@ -58,10 +56,11 @@ void CudaPbdTissue::push_all() {
   const pbd::Vertices& v = state_->vertices;
   d.count = v.size();
   d.mass.upload(v.mass, d.stream);
-  const std::vector<Tool>& tools = state_->scene.tools;
-  const auto tips = std::count_if(tools.begin(), tools.end(), [](const Tool& t) {
-    return t.type == ToolType::kProbe || t.type == ToolType::kBall;
-  });
+  int tips = 0;  // at most
+  for (const Tool& t : state_->scene.tools) {
+    const bool is_none = t.type == ToolType::kScalpel || t.type == ToolType::kGrasper;
+    if (!is_none) tips += collider_count(t.type);
+  }
   const std::size_t triangles = tips > 0 ? state_->triangles.size() : 0;
   d.triangles.upload(state_->triangles.data(), triangles, d.stream);
   d.tip_sweeps.resize(tips);

@@ -114,12 +114,12 @@ inline double most_borne(const EdgePiece& piece, const Vec3& along, const EdgeSu
   return (at.toughness + dull) * wide * slides.cross(along).norm();
 }
 
-/// Half of how wide an edge is to the tissue that it presses [m]. Tissue is crushed flat around a
-/// tip that is much thinner than J / E, and so is as wide: docs/cutting.md.
+/// Half of how wide an edge is to the tissue that it presses [m]. Thinner ones than this share of
+/// J / E sink in deeper than edges do here: docs/cutting.md.
 inline double width_of_tip(const EdgePiece& piece, const EdgeSupport& at) {
-  constexpr double kCrushed = 0.66;
-  const double crushed = kCrushed * (at.toughness / at.young_modulus + piece.edge_radius);
-  return std::max(crushed, piece.tip_radius);
+  constexpr double kThinnest = 0.66;
+  const double thinnest = kThinnest * (at.toughness / at.young_modulus + piece.edge_radius);
+  return std::max(thinnest, piece.tip_radius);
 }
 
 /// The spring of a unit of an edge's length [Pa]: what tissue sinks by because the edge, half so

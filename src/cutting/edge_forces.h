@@ -33,6 +33,7 @@ struct EdgeSupport {
   double mobility = 0;                              ///< sum of w^2 / m over its nodes [1/kg]
   double toughness = 0;                             ///< [J/m^2]
   double young_modulus = 0;                         ///< [Pa]
+  double poisson_ratio = 0;
 };
 
 /// The nodes that say how it stands there, and what of that stays as long as no cut goes on.
@@ -40,7 +41,7 @@ struct EdgeStencil {
   using Weights = Vec<4>;  ///< of a value; of its slopes in reference space [1/m]
 
   Vec3 place = Vec3::Zero();  ///< in reference space [m]
-  double mobility = 0, toughness = 0, young_modulus = 0;
+  double mobility = 0, toughness = 0, young_modulus = 0, poisson_ratio = 0;
   std::vector<std::int32_t> nodes;
   std::vector<Weights> weights;
 
@@ -71,8 +72,9 @@ EdgeSupport support_of(const Tissue& tissue, const EdgeStencil& stencil,
       v[a] += w[0] * speed[a];
     }
   }
-  EdgeSupport at{Vec3::Zero(),     Vec3(v[0], v[1], v[2]), Eigen::Matrix3d::Identity(),
-                 stencil.mobility, stencil.toughness,      stencil.young_modulus};
+  EdgeSupport at{Vec3::Zero(),         Vec3(v[0], v[1], v[2]), Eigen::Matrix3d::Identity(),
+                 stencil.mobility,     stencil.toughness,      stencil.young_modulus,
+                 stencil.poisson_ratio};
   for (int a = 0; a < 3; ++a) {
     for (int b = 0; b < 3; ++b) at.F(a, b) += u[a][1 + b];
     at.x[a] = stencil.place[a] + u[a][0];
@@ -112,6 +114,23 @@ inline double most_borne(const EdgePiece& piece, const Vec3& along, const EdgeSu
   return (at.toughness + dull) * wide * slides.cross(along).norm();
 }
 
+/// Half of how wide an edge is to the tissue that it presses [m]. Thinner ones than this share of
+/// J / E sink in deeper than edges do here: docs/cutting.md.
+inline double width_of_tip(const EdgePiece& piece, const EdgeSupport& at) {
+  constexpr double kThinnest = 0.66;
+  const double thinnest = kThinnest * (at.toughness / at.young_modulus + piece.edge_radius);
+  return std::max(thinnest, piece.tip_radius);
+}
+
+/// The spring of a unit of an edge's length [Pa]: what tissue sinks by because the edge, half so
+/// wide, is narrower than nodes show. Under a line load q that is 2 q ln(spread / width) / (pi E*)
+/// (Johnson, Contact Mechanics, 5.6).
+inline double stiffness_of_tip(const EdgeSupport& at, double width, double spread) {
+  constexpr double kPi = EIGEN_PI;
+  const double plane = at.young_modulus / (1 - at.poisson_ratio * at.poisson_ratio);
+  return kPi * plane / (2 * std::log(spread / width));
+}
+
 /// In what direction and how far the edge is ahead, and its frame, in the world.
 struct EdgeStand {
   Vec3 x = Vec3::Zero(), v = Vec3::Zero();  ///< of the middle [m], [m/s]
@@ -147,9 +166,10 @@ struct EdgePush {
 
 /// Of the piece in a substep of dt [s], on tissue with cells of this size.
 inline EdgePush push_of(const EdgePiece& piece, const EdgeStand& edge, const EdgeSupport& at,
-                        double cell_size, double dt, EdgeHold& hold) {
-  constexpr double kStiff = 16;     // [E] for a unit of length, where substeps bear it
-  constexpr double kBorne = 0.3;    // of a place's springs, times dt^2 / m
+                        double cell_size, double spread, double dt, EdgeHold& hold) {
+  constexpr double kStiff = 16;    // [E] for a unit of length, where cells show how wide it is
+  constexpr double kBorne = 0.75;  // of a place's springs, times dt^2 / m; of stiff ones:
+  constexpr double kStiffBorne = 0.3;
   constexpr double kSupport = 2;    // cells: pieces so near share their nodes
   constexpr double kRoom = 0.8;     // of that, at first
   constexpr double kDamping = 0.1;  // share of critical
@@ -171,12 +191,17 @@ inline EdgePush push_of(const EdgePiece& piece, const EdgeStand& edge, const Edg
     const Vec3 first = (way.dot(edge.onward) > 0 ? way : edge.onward).stableNormalized();
     std::copy(first.data(), first.data() + 3, hold.slides);
   }
+  const double width = width_of_tip(piece, at);
+  // Edges of scissors meet: what is between them is no wider than they are.
+  const bool is_thin = piece.tip_radius > 0 && width < spread;
   const double shared = std::max(1.0, kSupport * cell_size / piece.length);
-  const double light = at.mobility * shared * dt * dt / kBorne;
+  const double light = at.mobility * shared * dt * dt / (is_thin ? kBorne : kStiffBorne);
   // It stays as it is, and with it the force, while substeps get longer or shorter.
   double& stiffness = hold.stiffness;
   if (push.begins || stiffness * light > 1) {
-    stiffness = std::min(kStiff * at.young_modulus * piece.length, kRoom / light);
+    const double most = kStiff * at.young_modulus;
+    const double tip = is_thin ? std::min(most, stiffness_of_tip(at, width, spread)) : most;
+    stiffness = std::min(tip * piece.length, kRoom / light);
   }
   const double damping =
       2 * kDamping * std::sqrt(stiffness / std::max(1e-30, at.mobility * shared));
@@ -239,6 +264,7 @@ inline double distance2(const Box& box, const Vec3& x) {
 /// Before blades go on: which pieces hold tissue, and which will on the way from the share `begin`
 /// of the frame. A `Tissue` knows the method's:
 ///   cell_size()
+///   spread()                over how much its nodes spread a load on a line, at least [m]
 ///   look_near(box)          that what find() says of is near there; false where nothing is
 ///   find(x, place)          the material place at x [m]; false where none is
 ///   put(X, place)           moves a place to X in reference space; false where no tissue is there
@@ -438,7 +464,7 @@ class PushingEdges final : public EdgePushes {
     p.at = support_of(tissue_, p.stencil, p.moved);
     p.stand.x += p.reach * p.stand.onward;
     p.x = p.stand.x;
-    p.push = push_of(p.piece, p.stand, p.at, cell_, dt, p.hold);
+    p.push = push_of(p.piece, p.stand, p.at, cell_, tissue_.spread(), dt, p.hold);
     p.moved += p.push.slid;
   }
   /// The piece's place to where it slid.

@@ -60,6 +60,7 @@ ResistingEdges resisting_edges(const Scene& scene) {
   edges.tools = scene.tools;
   for (std::size_t i = 0; i < scene.tools.size(); ++i) {
     const Tool& tool = scene.tools[i];
+    const double tip = tool.type == ToolType::kScalpel ? 0.5 * tool.blade_thickness : 0;
     const auto add = [&](int side, const Vec3& from, const Vec3& to, const Vec3& onward) {
       const Vec3 way = to - from;
       const double length = way.norm();
@@ -67,7 +68,7 @@ ResistingEdges resisting_edges(const Scene& scene) {
           std::max(1, static_cast<int>(std::ceil(length / (kPiece * scene.cell_size))));
       for (int k = 0; k < count; ++k) {
         edges.pieces.push_back({static_cast<int>(i), side, from + (k + 0.5) / count * way,
-                                way / length, onward, length / count, tool.blade_edge_radius});
+                                way / length, onward, length / count, tool.blade_edge_radius, tip});
       }
     };
     if (tool.type == ToolType::kScalpel) {

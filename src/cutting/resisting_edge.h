@@ -19,6 +19,7 @@ struct EdgePiece {
   Vec3 along, onward;  ///< unit: along the edge; in the blade's plane out of it
   double length;       ///< [m]
   double edge_radius;  ///< [m]
+  double tip_radius;   ///< half of a scalpel's thickness [m]; 0: of scissors
 };
 
 /// A material place: of a body, none where that is -1, in reference space [m], and what a method

@@ -18,6 +18,8 @@ class NodeEdges {
   NodeEdges(MlsState& state, bool looks) : s_(state), looks_(looks) {}
 
   double cell_size() const { return mls_spacing(s_.scene); }
+  /// As FE references had it: docs/cutting.md.
+  double spread() const { return 2.75 * cell_size(); }
   template <class F>
   void each(int count, const F& f, int grain) const {
     s_.cpu->for_each(count, f, grain);
@@ -30,6 +32,7 @@ class NodeEdges {
     const Material& material = s_.nodes.material_of(i);
     stencil.toughness = material.toughness;
     stencil.young_modulus = material.young_modulus;
+    stencil.poisson_ratio = material.poisson_ratio;
     const double reach2 = s_.pairs.support[i] * s_.pairs.support[i], edge = s_.edge[i];
     struct Near {
       std::int32_t node;

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "cutting/edge_corners.h"
+#include "support/curve_file.h"
+#include "support/finite_element_scenes.h"
 #include "support/measured.h"
 #include "tissue/each_method.h"
 
@@ -145,6 +147,46 @@ TEST_P(CuttingForce, IsToughnessTimesWidth) {
     EXPECT_TRUE(
         is_at_most("from frame to frame, of J w", (steady.most - steady.least) / theory, 0.1, "%"))
         << width << " m, cells of " << cell;
+  }
+}
+
+// A blade with a tip of 1 mm, as thick as J / E, goes into a slab twice as wide as it is high,
+// bonded below, Poisson's ratio 0: plane strain. Before it cuts its load is that of contact, and it
+// cuts where that comes to J w.
+TEST_P(CuttingForce, BreaksAtTheDepthOfContact) {
+  constexpr double kStep = 0.0001;
+  for (const double height : {0.012, 0.024}) {
+    const std::string of = "blade_" + std::to_string(std::lround(1e3 * height)) + "mm";
+    const double theory = reference(TISSUE_SIM_TEST_DATA, of, "depth");
+    for (const double cell : {0.003, 0.002, 0.0015}) {
+      if (height > 0.02 && cell < 0.002) continue;
+      Slab slab;
+      slab.width = 0.006;
+      slab.cell = cell;
+      slab.height = height + 2 * cell;
+      slab.thickness = 2 * height;
+      slab.blade_thickness = 0.002;
+      Scene scene = on_this(scene_of(slab));
+      scene.damping = 20;
+      scene.materials[0].law = Law::kNeoHookean;
+      scene.materials[0].poisson_ratio = 0;
+      scene.bodies[0].anchors[0].z = 2 * cell;
+      Stroke stroke(scene, 0.005);
+      CurveFile curve(std::string("cutting_") +
+                          (GetParam().method == Method::kMls ? "mls" : "mpm") + "_" + of + "_" +
+                          std::to_string(std::lround(1e6 * cell)),
+                      "depth [m],push over J w,work of cutting [J]");
+      double at_break = 0;
+      for (double depth = -0.0005; depth < 1.5 * theory;) {
+        depth += kStep;
+        const double push = stroke.go(Vec3(0, 0, -kStep)).z() / (kToughness * slab.width);
+        curve.add({depth, push, stroke.cutting_work});
+        if (at_break == 0 && push > 0.98) at_break = depth;
+      }
+      EXPECT_TRUE(is_within("depth at break over that of contact, cells of 1.5 to 3 mm",
+                            at_break / theory - 1, 0.15))
+          << of << ", cells of " << cell;
+    }
   }
 }
 

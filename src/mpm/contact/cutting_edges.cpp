@@ -27,6 +27,8 @@ class LatticeEdges {
   explicit LatticeEdges(TouchingTissue& state) : s_(state) {}
 
   double cell_size() const { return s_.scene.cell_size; }
+  /// As FE references had it: docs/cutting.md.
+  double spread() const { return 1.4 * cell_size(); }
   template <class F>
   void each(int count, const F& f, int grain) const {
     s_.cpu->for_each(count, f, grain);
@@ -58,6 +60,7 @@ class LatticeEdges {
     const Material& material = body.material_of(s_.points, body.point(site.x, site.y, site.z));
     stencil.toughness = material.toughness;
     stencil.young_modulus = material.young_modulus;
+    stencil.poisson_ratio = material.poisson_ratio;
   }
 
   void motion(std::int32_t node, float (&u)[3], float (&v)[3]) const {

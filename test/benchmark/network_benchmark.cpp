@@ -29,7 +29,7 @@ void make_training_data(benchmark::State& bench) {
     for (int scene = 0; scene < 4; ++scene) {
       const DatasetSamples of =
           run_dataset_scene(make_dataset_scene(1, scene, {"tension", "cut"}), options);
-      samples += static_cast<double>(of.q.size());
+      samples += static_cast<double>(of.x.size()) / kPartingFeatureCount;
       frames += of.frames;
     }
   }

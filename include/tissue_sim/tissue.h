@@ -115,8 +115,8 @@ class Tissue {
   /// that was read last.
   virtual void read_surface(SurfaceTriangles& surface) = 0;
   /// Gives the tissue impulses at the corners of the triangles that read_surface() gave last, since
-  /// when it must not have advanced: three numbers a triangle, which each corner gets [N s]. They go
-  /// to what moves a corner.
+  /// when it must not have advanced: three numbers a triangle, which each corner gets [N s]. They
+  /// go to what moves a corner.
   virtual void push_surface(Span<const float> /*impulses*/) {
     throw std::logic_error("nothing presses on the surface of this tissue from without");
   }

@@ -118,8 +118,8 @@ double stable_fluid_step(const FluidState& state, float fastest);
 FluidSubstep fluid_substep(const FluidDrive& drive, int count,
                            const std::vector<Collider>& colliders);
 
-/// Advances the fluid; `walls` receive impulses, `loads` what acts on the colliders as the mean over
-/// the interval. Returns the number of substeps.
+/// Advances the fluid; `walls` receive impulses, `loads` what acts on the colliders as the mean
+/// over the interval. Returns the number of substeps.
 int advance_fluid(FluidState& state, const FluidDrive& drive, FluidWalls& walls,
                   std::vector<ColliderLoad>& loads);
 

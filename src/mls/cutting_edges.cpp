@@ -18,7 +18,7 @@ class NodeEdges {
   NodeEdges(MlsState& state, bool looks) : s_(state), looks_(looks) {}
 
   double cell_size() const { return mls_spacing(s_.scene); }
-  /// As FE references had it: docs/cutting.md.
+  /// Set by how deep finite elements have a blade in before it cuts: docs/cutting.md.
   double spread() const { return 2.75 * cell_size(); }
   template <class F>
   void each(int count, const F& f, int grain) const {

@@ -145,7 +145,7 @@ TEST(Fluid, LeavesANarrowSlitAtHalfOfSoundAtMost) {
     for (const float v : s.particles.v[0]) fastest = std::max(fastest, v);
   }
   EXPECT_GT(s.particles.x[0][0], kLong);
-  EXPECT_GT(fastest, 0.05f * s.laws[0].sound());
+  EXPECT_GT(fastest, 0.07f * s.laws[0].sound());  // 0.081 where shares are summed each time
   EXPECT_LT(fastest, 0.5f * s.laws[0].sound());
 }
 

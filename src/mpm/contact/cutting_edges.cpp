@@ -27,7 +27,7 @@ class LatticeEdges {
   explicit LatticeEdges(TouchingTissue& state) : s_(state) {}
 
   double cell_size() const { return s_.scene.cell_size; }
-  /// As FE references had it: docs/cutting.md.
+  /// Set by how deep finite elements have a blade in before it cuts: docs/cutting.md.
   double spread() const { return 1.4 * cell_size(); }
   template <class F>
   void each(int count, const F& f, int grain) const {
